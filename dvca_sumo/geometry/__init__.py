@@ -1,0 +1,1 @@
+"""Plane geometry without effects: angles, oriented boxes, polylines and Frenet projection."""

@@ -1,0 +1,46 @@
+"""Frozen snapshots of the simulator's truth.
+
+Made by `world`, judged by `oracles`, measured by the stack's sensors, and known to the idealized
+substitutes. No other part of a stack may be given one.
+"""
+
+import msgspec
+
+from dvca_sumo.messages import Floats, Integers, SignalColour, VehicleShape
+
+
+class EgoTruth(msgspec.Struct, frozen=True, gc=False):
+    """The ego's true motion at one instant; the pose is that of the rear axle centre."""
+
+    time: float  # [s]
+    x: float  # [m]
+    y: float  # [m]
+    heading: float  # [rad]
+    speed: float  # [m/s]
+    acceleration: float  # [m/s^2] along the heading
+    yaw_rate: float  # [rad/s]
+    steering: float  # [rad] front wheel angle
+
+
+class ObjectsTruth(msgspec.Struct, frozen=True):
+    """Every other traffic object near the ego at one instant."""
+
+    time: float  # [s]
+    ids: tuple[str, ...]  # (n,) SUMO ids, prefixed "person:" / "poi:" / "polygon:" unless a vehicle
+    classes: Integers  # (n,) ObjectClass
+    boxes: Floats  # (n, 5) x, y of the centre, heading, length, width
+    velocities: Floats  # (n, 2) [m/s]
+
+
+class Moment(msgspec.Struct, frozen=True):
+    """All truth about one ego at one instant."""
+
+    ego: EgoTruth
+    shape: VehicleShape
+    objects: ObjectsTruth
+    signals: dict[str, SignalColour]  # by signal id, those of the ego's route
+
+    @property
+    def time(self) -> float:
+        """[s]"""
+        return self.ego.time
