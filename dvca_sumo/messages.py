@@ -6,7 +6,6 @@ Arrays inside a message are never written to after it is made.
 """
 
 import enum
-from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -29,7 +28,7 @@ class Component(enum.StrEnum):
 COMPONENTS = tuple(Component)
 
 
-class MessageId(NamedTuple):
+class MessageId(msgspec.Struct, frozen=True, gc=False):
     """The index-th output of a component in one run, counted from 0."""
 
     component: Component
@@ -116,8 +115,8 @@ class PredictedObjects(msgspec.Struct, frozen=True):
         return self.objects.time
 
 
-PREDICTION_TIMES: Floats = np.arange(25) * 0.25  # [s] 0 ... 6 s after the message
-TRAJECTORY_TIMES: Floats = np.arange(81) * 0.1  # [s] 0 ... 8 s after the message
+PREDICTION_TIMES: Floats = np.arange(25, dtype=np.float64) * 0.25  # [s] 0 ... 6 s after the message
+TRAJECTORY_TIMES: Floats = np.arange(81, dtype=np.float64) * 0.1  # [s] 0 ... 8 s after the message
 
 # Columns of Trajectory.points.
 T, X, Y, HEADING, SPEED, ACCELERATION, CURVATURE = range(7)

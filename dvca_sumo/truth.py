@@ -30,6 +30,7 @@ class ObjectsTruth(msgspec.Struct, frozen=True):
     classes: Integers  # (n,) ObjectClass
     boxes: Floats  # (n, 5) x, y of the centre, heading, length, width
     velocities: Floats  # (n, 2) [m/s]
+    lanes: tuple[str, ...] = ()  # (n,) lane each one is on, "" off the road; () when it was not asked for
 
 
 class Moment(msgspec.Struct, frozen=True):

@@ -1,0 +1,195 @@
+"""Attribution of a driving violation: Algorithm 1 with its premise, every step kept as evidence."""
+
+import math
+from collections.abc import Iterator
+
+import msgspec
+from msgspec.structs import replace
+
+from dvca_sumo.analysis.bisection import Outcome
+from dvca_sumo.analysis.components import ComponentAnswer, Verdict, responsible_component
+from dvca_sumo.analysis.differences import Difference, differences
+from dvca_sumo.analysis.dtest import Dtest, Probe, Question, Setting
+from dvca_sumo.analysis.messages import MessageAnswer, violation_inducing_message
+from dvca_sumo.analysis.specification import first_violating_plan
+from dvca_sumo.analysis.violating import principal
+from dvca_sumo.engine.protocol import Engine
+from dvca_sumo.interventions import Fault, recorded_futures
+from dvca_sumo.messages import PREDICTION_TIMES, Component, MessageId
+from dvca_sumo.record import MessageMark, Record, digest_of
+from dvca_sumo.run import StopRule, Task
+from dvca_sumo.scenario import Scenario
+from dvca_sumo.violations import Answer, Category, Violation
+
+SETTLE = 8.0  # [s] past the factual violation without any: a counterfactual run is safe
+_HORIZON = float(PREDICTION_TIMES[-1])  # [s] the factual run goes on for, so that its last futures are whole
+
+
+class Request(msgspec.Struct, frozen=True):
+    """What is to be attributed, and how carefully."""
+
+    scenario: Scenario
+    faults: tuple[Fault, ...] = ()
+    repeats: int | None = None  # None: exact mode; else jitter mode with so many runs of each question
+
+
+class Planted(msgspec.Struct, frozen=True):
+    """How the answer compares with the faults that were planted."""
+
+    component: Component
+    altered: tuple[int, ...]  # messages of the factual run that a fault changed
+    component_success: bool
+    message_success: bool
+    message_distance: float | None  # [s] from the reported message to the nearest altered one
+
+
+class Attribution(msgspec.Struct, frozen=True):
+    """The answer, and all that proves it."""
+
+    record: Record
+    digest: str
+    violation: Violation | None
+    verdict: Verdict
+    is_reproducible: bool
+    reason: str
+    until: float  # [s] see Setting
+    components: ComponentAnswer | None = None
+    messages: MessageAnswer | None = None
+    message: MessageMark | None = None
+    differences: tuple[Difference, ...] = ()
+    probes: tuple[Probe, ...] = ()
+    evidence: tuple[Probe, ...] = ()  # the two adjacent probes
+    planted: Planted | None = None
+
+
+class AttributionStoppedError(Exception):
+    """The user interrupted an attribution; `partial` holds all that was found until then."""
+
+    def __init__(self, partial: Attribution) -> None:
+        super().__init__("interrupted")
+        self.partial = partial
+
+
+class Progress:
+    """Hears of an attribution as it goes; does nothing by itself."""
+
+    def factual(self, record: Record) -> None:
+        """The factual run is done."""
+
+    def probe(self, probe: Probe) -> None:
+        """A probe is done."""
+
+
+def attribute(engine: Engine, request: Request, progress: Progress) -> Attribution:
+    """Run a scenario, and explain its violation if there is one.
+
+    Raises:
+        ScenarioError, StackError: The scenario cannot be run with this stack.
+        RunFailedError: The factual run crashed or hung.
+        AttributionStoppedError: The user interrupted it after the factual run.
+    """
+    jitters: tuple[int | None, ...] = (None,) if request.repeats is None else tuple(range(request.repeats))
+    factual = Task(request.scenario, request.faults, StopRule(after_contact=_HORIZON), jitter=jitters[0])
+    record = engine.record(factual)
+    progress.factual(record)
+    found = Attribution(record, digest_of(record), None, Verdict.NONE, True, _doubts(record), math.inf)
+    if not record.violations:
+        return found
+    violation = principal(record.violations)
+    is_mission = violation.category is Category.MISSION
+    until = math.inf if is_mission else violation.time + SETTLE
+    futures = recorded_futures(record.moments)
+    dtest = Dtest(engine, Setting(request.scenario, request.faults, futures, until, is_mission, jitters), progress.probe)
+    found = replace(found, violation=violation, until=until, verdict=Verdict.UNRESOLVED)
+    try:
+        for found in _steps(found, engine, dtest, factual, request):  # noqa: B007 - each is the answer so far
+            pass
+    except KeyboardInterrupt:
+        partial = replace(found, probes=tuple(dtest.probes), reason="interrupted")
+        raise AttributionStoppedError(partial) from None
+    return replace(
+        found, probes=tuple(dtest.probes), planted=_planted(request.faults, found) if request.faults else None
+    )
+
+
+def _steps(
+    found: Attribution, engine: Engine, dtest: Dtest, factual: Task, request: Request
+) -> Iterator[Attribution]:
+    """The answer after each step of Algorithm 1."""
+    doubt = _premise(engine, dtest, factual, found)
+    if doubt:
+        yield replace(found, verdict=Verdict.NOT_REPRODUCIBLE, is_reproducible=False, reason=doubt)
+        return
+    answer = responsible_component(dtest)
+    found = replace(found, verdict=answer.verdict, reason=answer.reason, components=answer)
+    yield found
+    if answer.verdict is Verdict.PLANNING:
+        yield _planning_message(found, engine)
+    elif answer.verdict is Verdict.COMPONENT:
+        yield _component_message(found, dtest, answer, is_exact=request.repeats is None)
+
+
+def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution) -> str:
+    """Why the violation does not reproduce; empty when it does."""
+    if factual.jitter is not None:
+        outcome = dtest.ask(Question(()))
+        return "" if outcome is Outcome.VIOLATES else f"most re-runs do not violate: {outcome}"
+    probe = dtest.repeat(factual)
+    if probe.outcome is Outcome.UNRESOLVED:
+        return f"the repeated run could not be told: {probe.reason}"
+    if probe.digest == found.digest:
+        return ""
+    again = engine.record(factual)
+    for first, second in zip(found.record.path, again.path, strict=False):
+        if first != second:
+            return f"the repeated run differs: first at {first.time:.2f} s, ego at ({second.x:.3f}, {second.y:.3f})"
+    return "the repeated run differs in its messages or its traffic, not in the ego's motion"
+
+
+def _planning_message(found: Attribution, engine: Engine) -> Attribution:
+    assert found.violation is not None
+    record = found.record
+    finding = first_violating_plan(record, engine.roadmap, record.thresholds, found.violation)
+    if finding is None:
+        reason = f"{found.reason}; no planning message by itself breaks the specification"
+        return replace(found, reason=reason)
+    return replace(
+        found, message=finding.mark, differences=(Difference("trajectory", finding.reason, 0.0),)
+    )
+
+
+def _component_message(found: Attribution, dtest: Dtest, answer: ComponentAnswer, *, is_exact: bool) -> Attribution:
+    assert found.violation is not None
+    assert answer.component is not None  # a verdict of COMPONENT names one
+    record, component = found.record, answer.component
+    messages = violation_inducing_message(dtest, record, component, found.violation.time, is_exact=is_exact)
+    mark = messages.last_safe
+    ends = [Question((component,), mark)]
+    if messages.first_violating is not None:
+        ends.append(Question((component,), messages.first_violating))
+    return replace(
+        found,
+        messages=messages,
+        message=mark,
+        differences=differences(record, MessageId(component, mark.index), dtest.futures, found.violation.object),
+        evidence=tuple(probe for probe in map(dtest.evidence, ends) if probe is not None),
+    )
+
+
+def _planted(faults: tuple[Fault, ...], found: Attribution) -> Planted:
+    """Held against the fault of the component that was named, else against the first."""
+    component = found.components.component if found.components is not None else None
+    fault = next((one for one in faults if one.component == component), faults[0])
+    altered = tuple(found.record.altered[fault.component])
+    is_right = component == fault.component
+    distance: float | None = None
+    if is_right and found.message is not None and altered:
+        times = [found.record.mark(MessageId(fault.component, index)).time for index in altered]
+        distance = min(abs(time - found.message.time) for time in times)
+    has_message = is_right and found.message is not None and found.message.index in altered
+    return Planted(fault.component, altered, is_right, has_message, distance)
+
+
+def _doubts(record: Record) -> str:
+    unknown = [one for one in record.judgements if one.answer is Answer.UNKNOWN]
+    return "; ".join(f"{one.kind} could not be told: {one.reason}" for one in unknown)

@@ -1,0 +1,169 @@
+"""dtest: would the violation still occur if these messages had been ideal?
+
+One object wraps every question: it turns a question into runs, caches and counts them, keeps each as
+evidence, and tells progress.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+
+import msgspec
+
+from dvca_sumo.analysis.bisection import Outcome
+from dvca_sumo.engine.processes import Failure
+from dvca_sumo.engine.protocol import Engine, Glimpse
+from dvca_sumo.interventions import Fault, Futures, Ideal, Selection, State
+from dvca_sumo.messages import Component
+from dvca_sumo.record import MessageMark
+from dvca_sumo.run import StopRule, Task
+from dvca_sumo.scenario import Scenario
+from dvca_sumo.violations import Answer, Violation
+
+
+class Question(msgspec.Struct, frozen=True):
+    """Are the messages of `ideal` from `since` on (None: all of them), being ideal, enough for a safe run?"""
+
+    ideal: tuple[Component, ...]
+    since: MessageMark | None = None
+
+
+class Probe(msgspec.Struct, frozen=True):
+    """One run of one question: evidence."""
+
+    id: int
+    question: Question
+    jitter: int | None
+    outcome: Outcome
+    violation: Violation | None
+    reason: str  # why it is unresolved
+    simulated: float  # [s]
+    wall: float  # [s]
+    digest: str | None
+    passes: int
+    residual: float | None  # [m] see Glimpse
+
+
+class Setting(msgspec.Struct, frozen=True):
+    """What all probes of one attribution share."""
+
+    scenario: Scenario
+    faults: tuple[Fault, ...]
+    futures: Futures  # of the factual run, continued past the violation
+    until: float  # [s] a probe without a violation up to here is safe; inf: to the end of the scenario
+    is_mission: bool  # the factual violation is one that only a finished drive can answer
+    jitters: tuple[int | None, ...]  # one run of each question for each; (None,) in exact mode
+
+
+class Dtest:
+    """Asks counterfactual questions of an engine."""
+
+    def __init__(self, engine: Engine, setting: Setting, on_probe: Callable[[Probe], None]) -> None:
+        self._engine = engine
+        self._setting = setting
+        self._on_probe = on_probe
+        self._answers: dict[Question, Outcome] = {}
+        self.probes: list[Probe] = []
+
+    @property
+    def futures(self) -> Futures:
+        """Of the factual run."""
+        return self._setting.futures
+
+    def ask(self, question: Question) -> Outcome:
+        """The outcome of one question; asked before, it costs nothing."""
+        return self.ask_all([question])[0]
+
+    def ask_all(self, questions: Sequence[Question]) -> list[Outcome]:
+        """The outcomes of several questions, run side by side.
+
+        Probe ids follow the order of the questions, not of their finishing.
+        """
+        new = [question for question in dict.fromkeys(questions) if question not in self._answers]
+        runs = [(question, jitter) for question in new for jitter in self._setting.jitters]
+        first = len(self.probes)
+
+        def made(row: int, answer: Glimpse | Failure) -> Probe:
+            return _probe(first + row, *runs[row], answer, self._setting)
+
+        answers = self._engine.glimpses(
+            [self._task(question, jitter) for question, jitter in runs],
+            lambda row, answer: self._on_probe(made(row, answer)),
+        )
+        probes = [made(row, answer) for row, answer in enumerate(answers)]
+        self.probes += probes
+        for question in new:
+            self._answers[question] = majority([one.outcome for one in probes if one.question == question])
+        return [self._answers[question] for question in questions]
+
+    def repeat(self, factual: Task) -> Probe:
+        """Run the factual task once more, to the same end: the premise of every conclusion."""
+        (answer,) = self._engine.glimpses([factual], lambda _row, _answer: None)
+        probe = _probe(len(self.probes), Question(()), factual.jitter, answer, self._setting)
+        self._on_probe(probe)
+        self.probes.append(probe)
+        return probe
+
+    def evidence(self, question: Question) -> Probe | None:
+        """The first probe of a question, among those that agree with its answer; None when it was not asked."""
+        if question not in self._answers:
+            return None
+        outcome = self._answers[question]
+        of_question = [probe for probe in self.probes if probe.question == question]
+        return next((probe for probe in of_question if probe.outcome is outcome), of_question[0])
+
+    def _task(self, question: Question, jitter: int | None) -> Task:
+        ideals = [Ideal(component, self._selection(question.since)) for component in question.ideal]
+        return Task(
+            scenario=self._setting.scenario,
+            interventions=(*self._setting.faults, *ideals),
+            stop=StopRule(after_violation=0.0, at=self._setting.until),
+            futures=self._setting.futures,
+            jitter=jitter,
+        )
+
+    def _selection(self, since: MessageMark | None) -> Selection:
+        if since is None:
+            return Selection()
+        if self._setting.jitters == (None,):
+            return Selection(first=since.index)  # bit-exact: indices of both runs coincide
+        return Selection(from_state=State(*since.state))
+
+
+def majority(outcomes: Sequence[Outcome]) -> Outcome:
+    """What more than half of the runs say; UNRESOLVED when no outcome has that many."""
+    outcome, count = Counter(outcomes).most_common(1)[0]
+    return outcome if 2 * count > len(outcomes) else Outcome.UNRESOLVED
+
+
+def _probe(number: int, question: Question, jitter: int | None, answer: Glimpse | Failure, setting: Setting) -> Probe:
+    if isinstance(answer, Failure):
+        reason = f"{answer.reason}; {answer.said}" if answer.said else answer.reason
+        return Probe(number, question, jitter, Outcome.UNRESOLVED, None, reason, 0.0, 0.0, None, 0, None)
+    outcome, reason = _outcome(answer, setting)
+    return Probe(
+        id=number,
+        question=question,
+        jitter=jitter,
+        outcome=outcome,
+        violation=answer.violations[0] if answer.violations else None,
+        reason=reason,
+        simulated=answer.simulated,
+        wall=answer.wall,
+        digest=answer.digest,
+        passes=answer.passes,
+        residual=answer.residual,
+    )
+
+
+def _outcome(answer: Glimpse, setting: Setting) -> tuple[Outcome, str]:
+    if answer.violations:
+        return Outcome.VIOLATES, ""
+    blind = [one for one in answer.judgements if one.answer is Answer.UNKNOWN and one.kind not in _MISSION]
+    if setting.is_mission:
+        blind = [one for one in answer.judgements if one.answer is Answer.UNKNOWN]
+    if blind:
+        return Outcome.UNRESOLVED, "; ".join(f"{one.kind}: {one.reason}" for one in blind)
+    return Outcome.SAFE, ""
+
+
+_MISSION = ("destination", "no_progress")  # an oracle of these cannot tell of a run stopped early: no reason for doubt

@@ -1,0 +1,120 @@
+"""Planning messages, judged one by one against the specification (Algorithm 1, violationTest).
+
+A trajectory contains all that is needed to judge it: it is driven, on paper, against the recorded
+truth, and the run's own oracles look on. Two more rules need no driving: there must be a trajectory,
+and it must begin where, and as fast as, the ego is.
+"""
+
+import math
+
+import msgspec
+
+from dvca_sumo.analysis.violating import is_same_family
+from dvca_sumo.geometry.angles import wrapped
+from dvca_sumo.geometry.frames import relative, transferred
+from dvca_sumo.messages import ACCELERATION, CURVATURE, HEADING, SPEED, X, Y, Component, MessageId, Trajectory
+from dvca_sumo.oracles import judge, judges
+from dvca_sumo.record import MessageMark, Record
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.thresholds import Thresholds
+from dvca_sumo.truth import EgoTruth, Moment
+from dvca_sumo.violations import Category, Ending, Violation
+
+FORESIGHT = 3.0  # [s] of a trajectory that must keep the rules: farther ahead, a sound plan may rest on a guess
+BESIDE = 1.0  # [m] sideways a trajectory may begin from where the ego believes to be
+SPEED_GAP = 3.0  # [m/s] likewise of the speed
+_STANDING = 0.2  # [m/s]
+
+
+class PlanningFinding(msgspec.Struct, frozen=True):
+    """The first planning message that breaks the specification, and how."""
+
+    mark: MessageMark
+    reason: str
+
+
+def first_violating_plan(
+    record: Record, roadmap: RoadMap, thresholds: Thresholds, violation: Violation
+) -> PlanningFinding | None:
+    """The first planning message that itself leads to `violation`, or None when none does.
+
+    For safety and traffic rules: it is missing, does not begin where the ego is, or breaks a rule of
+    the violation's family when driven for `FORESIGHT`. For missions: it is missing, or plans to stand.
+    """
+    executions = record.executions[Component.PLANNING]
+    for index, execution in enumerate(executions):
+        mark = record.mark(MessageId(Component.PLANNING, index))
+        if mark.time > violation.time:
+            return None
+        if not isinstance(execution.message, Trajectory):
+            return PlanningFinding(mark, "no trajectory was published")
+        reason = _discontinuity(record, execution.message, execution.tick)
+        if not reason and violation.category is Category.MISSION:
+            reason = _standstill(execution.message, mark, violation, thresholds)
+        elif not reason:
+            reason = _breach(record, roadmap, thresholds, execution.message, execution.tick, violation)
+        if reason:
+            return PlanningFinding(mark, reason)
+    return None
+
+
+def _discontinuity(record: Record, trajectory: Trajectory, tick: int) -> str:
+    believed, first = record.believed_at(tick), trajectory.points[0]
+    ahead, left, _ = relative(
+        (float(first[X]), float(first[Y]), 0.0), (believed.x, believed.y, believed.heading)
+    )
+    if abs(left) > BESIDE:
+        side = "left" if left > 0.0 else "right"
+        return f"the trajectory begins {abs(left):.1f} m to the {side} of where the ego believes to be"
+    gap = float(first[SPEED]) - believed.speed
+    if abs(gap) > SPEED_GAP:
+        return f"the trajectory begins {gap:+.1f} m/s off the ego's speed of {believed.speed:.1f} m/s"
+    return ""
+
+
+def _standstill(trajectory: Trajectory, mark: MessageMark, violation: Violation, thresholds: Thresholds) -> str:
+    begun = violation.time - thresholds.no_progress_time
+    if violation.kind == "no_progress" and mark.time < begun:
+        return ""
+    if float(trajectory.points[:, SPEED].max()) < _STANDING and violation.kind != "destination_overrun":
+        return f"the trajectory stands still ({trajectory.decision})"
+    return ""
+
+
+def _breach(
+    record: Record, roadmap: RoadMap, thresholds: Thresholds, trajectory: Trajectory, tick: int, violation: Violation
+) -> str:
+    moments = _driven(record, trajectory, tick)
+    for judgement in judge(moments, judges(record.route, thresholds, roadmap), Ending.CUT):
+        for found in judgement.violations:
+            if is_same_family(found.kind, violation) and found.object == violation.object:
+                return f"driven as planned it leads to {found.kind} in {found.time - moments[0].time:.1f} s"
+    return ""
+
+
+def _driven(record: Record, trajectory: Trajectory, tick: int) -> list[Moment]:
+    """The recorded truth with the ego where the trajectory, read from its true place, takes it."""
+    believed, ego = record.believed_at(tick), record.path[tick]
+    origin = (ego.x, ego.y, ego.heading)
+    poses = transferred(
+        trajectory.points[:, [X, Y, HEADING]], (believed.x, believed.y, believed.heading), origin
+    )
+    moments: list[Moment] = []
+    for moment in record.moments:
+        elapsed = moment.time - trajectory.time
+        if not -1e-6 <= elapsed <= FORESIGHT:
+            continue
+        row = min(round(elapsed * 10.0), len(poses) - 1)
+        point = trajectory.points[row]
+        truth = EgoTruth(
+            time=moment.time,
+            x=float(poses[row, 0]),
+            y=float(poses[row, 1]),
+            heading=wrapped(float(poses[row, 2])),
+            speed=float(point[SPEED]),
+            acceleration=float(point[ACCELERATION]),
+            yaw_rate=float(point[SPEED] * point[CURVATURE]),
+            steering=math.atan(moment.shape.wheelbase * float(point[CURVATURE])),
+        )
+        moments.append(msgspec.structs.replace(moment, ego=truth))
+    return moments

@@ -1,0 +1,140 @@
+"""Jobs in processes of their own, so that a crash or a hang costs one job and never the tool.
+
+Rules of this file: no thread is ever started; a child leaves only through its pipe or a signal; no
+child outlives its parent.
+"""
+
+import ctypes
+import multiprocessing
+import os
+import pickle
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Generic, TypeVar
+
+import msgspec
+
+Result = TypeVar("Result")
+
+_PR_SET_PDEATHSIG = 1  # linux/prctl.h
+_SAID_LINES = 5  # of standard error that a failure quotes
+
+
+class Failure(msgspec.Struct, frozen=True):
+    """A job without a result: it crashed, hung, or raised."""
+
+    reason: str  # one line
+    said: str  # last lines of its standard error
+    error: Exception | None = None  # what it raised, if it did
+
+
+class _Child(Generic[Result]):
+    """One running job."""
+
+    def __init__(self, index: int, job: Callable[[], Result], log: Path, timeout: float) -> None:
+        context = multiprocessing.get_context("fork" if hasattr(os, "fork") else "spawn")
+        self.index = index
+        self.log = log
+        self.deadline = time.monotonic() + timeout
+        self.receiver, sender = context.Pipe(duplex=False)
+        self.process: BaseProcess = context.Process(target=_work, args=(job, sender, log, os.getpid()))
+        self.process.start()
+        sender.close()
+
+    def collect(self) -> Result | Failure:
+        """Its result; called when the pipe has something to say or is closed."""
+        try:
+            answer: Result | Failure = self.receiver.recv()
+        except EOFError:
+            self.process.join()
+            return Failure(_death(self.process.exitcode), _said(self.log))
+        self.process.join()
+        if isinstance(answer, Failure):
+            return Failure(answer.reason, _said(self.log), answer.error)
+        return answer
+
+    def kill(self) -> None:
+        """End it now."""
+        self.process.kill()
+        self.process.join()
+
+
+def isolated(
+    jobs: Sequence[Callable[[], Result]], parallel: int, timeout: float
+) -> Iterator[tuple[int, Result | Failure]]:
+    """Run every job in a process of its own, at most `parallel` at once.
+
+    Yields (row of the job, its result or `Failure`) as they finish. A job that takes longer than
+    `timeout` [s] is killed. Leaving the iterator early, by any exception, kills what still runs.
+    """
+    waiting = list(enumerate(jobs))[::-1]
+    running: list[_Child[Result]] = []
+    with tempfile.TemporaryDirectory(prefix="dvca-sumo-log-") as folder:
+        try:
+            while waiting or running:
+                while waiting and len(running) < parallel:
+                    index, job = waiting.pop()
+                    running.append(_Child(index, job, Path(folder) / str(index), timeout))
+                remaining = min(child.deadline for child in running) - time.monotonic()
+                ready = wait([child.receiver for child in running], max(remaining, 0.0))
+                for child in [one for one in running if one.receiver in ready]:
+                    running.remove(child)
+                    yield child.index, child.collect()
+                for child in [one for one in running if time.monotonic() > one.deadline]:
+                    running.remove(child)
+                    child.kill()
+                    yield child.index, Failure(f"no answer within {timeout:.0f} s", _said(child.log))
+        finally:
+            for child in running:
+                child.kill()
+
+
+def _work(job: Callable[[], object], sender: Connection, log: Path, parent: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt ends
+    _die_with(parent)
+    descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    os.dup2(descriptor, 1)
+    os.dup2(descriptor, 2)
+    try:
+        answer = job()
+    except Exception as error:  # noqa: BLE001 - whatever a job raises is its answer
+        os.write(2, traceback.format_exc().encode())
+        answer = Failure(f"{type(error).__name__}: {error}", "", _sendable(error))
+    sender.send(answer)
+    sender.close()
+    os._exit(0)  # SUMO's and the test runner's exit handlers are not this process's business
+
+
+def _sendable(error: Exception) -> Exception | None:
+    """The bare error, or None where it does not survive the way to another process."""
+    error.__traceback__ = error.__cause__ = error.__context__ = None
+    try:
+        pickle.loads(pickle.dumps(error))  # noqa: S301 - made in the line itself
+    except Exception:  # noqa: BLE001 - a foreign exception may fail in any way
+        return None
+    return error
+
+
+def _die_with(parent: int) -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:  # it died before the line above
+            os._exit(1)
+
+
+def _death(code: int | None) -> str:
+    if code is not None and code < 0:
+        return f"the process died of {signal.Signals(-code).name}"
+    return f"the process ended with code {code} without an answer"
+
+
+def _said(log: Path) -> str:
+    lines = log.read_text(errors="replace").splitlines() if log.exists() else []
+    return "\n".join(lines[-_SAID_LINES:])

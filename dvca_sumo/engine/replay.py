@@ -1,0 +1,84 @@
+"""The replay engine: every run starts at time 0, in a process of its own."""
+
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from pathlib import Path
+
+from dvca_sumo.engine.passes import glimpse
+from dvca_sumo.engine.processes import Failure, isolated
+from dvca_sumo.engine.protocol import Glimpse, RunFailedError
+from dvca_sumo.record import Record
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.run import Task, rtest
+from dvca_sumo.scenario import ScenarioError
+from dvca_sumo.stack.reference import StackError, stack_factory
+
+_DEFAULT_TIMEOUT = 600.0  # [s] of wall time for one run
+
+
+class ReplayEngine:
+    """Re-runs from time 0: slow, and the witness that every other engine is held against."""
+
+    name = "replay"
+
+    def __init__(self, net: Path, stack: str | None, jobs: int, timeout: float = _DEFAULT_TIMEOUT) -> None:
+        """An engine for scenarios on one net, with one stack (`--stack`'s word).
+
+        Raises:
+            RoadMapError: The net cannot be read.
+            StackError: The stack cannot be read or imported.
+        """
+        self.jobs = jobs
+        self._net = net
+        self._stack = stack
+        self._timeout = timeout
+        # Loaded before any process starts: a forked child finds both in its cache.
+        self.roadmap = _roadmap(net, "passenger")
+        stack_factory(stack)
+
+    def record(self, task: Task) -> Record:
+        """See `Engine`."""
+        job = partial(_rtest, self._net, self._stack, task)
+        ((_, answer),) = isolated([job], 1, self._timeout)
+        if isinstance(answer, Failure):
+            raise _raised(answer)
+        return answer
+
+    def glimpses(
+        self, tasks: Sequence[Task], on_result: Callable[[int, Glimpse | Failure], None]
+    ) -> list[Glimpse | Failure]:
+        """See `Engine`."""
+        jobs = [partial(_glimpse, self._net, self._stack, task) for task in tasks]
+        answers: dict[int, Glimpse | Failure] = {}
+        for row, answer in isolated(jobs, self.jobs, self._timeout):
+            answers[row] = answer
+            on_result(row, answer)
+        return [answers[row] for row in range(len(tasks))]
+
+
+@cache
+def _roadmap(net: Path, vehicle_class: str) -> RoadMap:
+    return RoadMap.load(net, vehicle_class)
+
+
+def _rtest(net: Path, stack: str | None, task: Task) -> Record:
+    return rtest(task, partial(_roadmap, net), stack_factory(stack))
+
+
+def _glimpse(net: Path, stack: str | None, task: Task) -> Glimpse:
+    return glimpse(task, partial(_rtest, net, stack))
+
+
+def _raised(failure: Failure) -> Exception:
+    words = _sumo_words(failure.said)
+    if isinstance(failure.error, ScenarioError):
+        return ScenarioError(f"{failure.error}{words}")
+    if isinstance(failure.error, StackError):
+        return failure.error
+    return RunFailedError(f"the run failed: {failure.reason}{words}")
+
+
+def _sumo_words(said: str) -> str:
+    """SUMO's own explanation: an exception of libsumo's does not carry it."""
+    lines = [line.strip() for line in said.splitlines() if line.startswith(("Error:", "***", "Fatal"))]
+    return f" ({' '.join(lines)})" if lines else ""

@@ -1,0 +1,173 @@
+"""Directed lines through points, and Frenet coordinates along them.
+
+The position runs along straight segments. The heading turns from one segment to the next within
+half a metre to a metre of the vertex (half a segment where segments are short), so that it, and
+every line at a fixed offset, is continuous.
+"""
+
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float64]
+
+_TURNING_REACH = 1.0  # [m] at most so far from a vertex does the heading begin to turn
+_FOLD = 0.5  # curvature times offset above which normals come too close to crossing to be told apart
+
+
+class Polyline:
+    """A directed line through at least two distinct points; repeated points are dropped.
+
+    Stations are arc lengths from the first point [m]; offsets are lateral, positive to the left [m].
+    All arrays are read-only. Raises ValueError for fewer than two distinct points.
+    """
+
+    def __init__(self, points: npt.ArrayLike) -> None:
+        kept = np.array(points, dtype=np.float64).reshape(-1, 2)
+        repeated = (kept[1:] == kept[:-1]).all(axis=1)
+        if repeated.any():
+            kept = kept[np.concatenate(([True], ~repeated))]
+        if len(kept) < 2:
+            raise ValueError(f"a polyline needs two distinct points, not {len(kept)}")
+        self.points = _fixed(kept)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def length(self) -> float:
+        """Arc length [m]."""
+        return float(self.stations[-1])
+
+    @cached_property
+    def stations(self) -> Floats:
+        """(n,) arc length at each point [m], strictly increasing from 0."""
+        return _fixed(np.concatenate(([0.0], np.cumsum(self._lengths))))
+
+    @cached_property
+    def headings(self) -> Floats:
+        """(n,) heading at each point [rad], continuous (not wrapped)."""
+        return _fixed(np.interp(self.stations, self._turn_stations, self._turn_headings))
+
+    @cached_property
+    def curvatures(self) -> Floats:
+        """(n,) curvature at each point [1/m], positive to the left; that of the neighbour at either end."""
+        turns = np.diff(self._directions)
+        inner = turns / (0.5 * (self._lengths[1:] + self._lengths[:-1]))
+        if not len(inner):
+            return _fixed(np.zeros(2))
+        return _fixed(np.concatenate((inner[:1], inner, inner[-1:])))
+
+    def poses(self, stations: npt.ArrayLike, offsets: Floats | float = 0.0) -> Floats:
+        """The poses at `stations` (m,), moved sideways by `offsets` (m,): (m, 3) x, y, heading (not wrapped).
+
+        Beyond its ends the line goes on straight.
+        """
+        along = np.asarray(stations, dtype=np.float64)
+        segments = self.stations[1:-1].searchsorted(along, side="right")
+        headings = np.interp(along, self._turn_stations, self._turn_headings)
+        centres = self.points[segments] + (along - self.stations[segments])[:, None] * self._units[segments]
+        poses = np.empty((len(along), 3))
+        poses[:, 0] = centres[:, 0] - offsets * np.sin(headings)
+        poses[:, 1] = centres[:, 1] + offsets * np.cos(headings)
+        poses[:, 2] = headings
+        return poses
+
+    def project(self, points: npt.ArrayLike, *, between: tuple[float, float] | None = None) -> tuple[Floats, Floats]:
+        """Stations and offsets (m,), (m,) of `points` (m, 2): the inverse of `poses`.
+
+        Stations stay within [0, length], and within `between` when that is given (only this stretch is
+        searched then, which tells the two passes of a loop apart and is fast). The offset is the
+        distance to the line at that station, negative to the right; beyond an end it is thus not
+        perpendicular.
+        """
+        low, high = (0.0, self.length) if between is None else self._window(*between)
+        first = int(self.stations[1:-1].searchsorted(low, side="right"))
+        last = max(int(self.stations[1:].searchsorted(high)) + 1, first + 1)
+        xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+        local = np.ones((len(xy), 3))
+        np.subtract(xy, self.points[0], out=local[:, :2])
+        along = local @ self._along[:, first:last]
+        nearest = np.maximum(along, 0.0)
+        np.minimum(nearest, self._lengths[first:last], out=nearest)
+        along *= -2.0
+        along += nearest
+        along *= nearest
+        along += local @ self._from_start[:, first:last]
+        segments = along.argmin(axis=1)
+        stations = self.stations[first + segments] + nearest[np.arange(len(xy)), segments]
+        return self._refined(xy, stations, low, high)
+
+    def _refined(self, xy: Floats, stations: Floats, low: float, high: float) -> tuple[Floats, Floats]:
+        """One Newton step from the nearest point to where the interpolated normal meets the point.
+
+        On the nearest segment alone, stations stand still outside a vertex and jump inside it.
+        """
+        knots = self._turn_stations[1:-1].searchsorted(stations, side="right")
+        turning = self._turn_rates[knots]
+        headings = self._turn_headings[knots] + turning * (stations - self._turn_stations[knots])
+        cosines, sines = np.cos(headings), np.sin(headings)
+        dx, dy = self._gaps(xy, stations)
+        across = dy * cosines - dx * sines
+        fold = turning * across
+        step = np.where(np.abs(fold) < _FOLD, (dx * cosines + dy * sines) / (1.0 - fold), 0.0)
+        refined = np.minimum(np.maximum(stations + step, low), high)
+        return refined, np.copysign(np.hypot(*self._gaps(xy, refined)), across)
+
+    def _gaps(self, xy: Floats, stations: Floats) -> tuple[Floats, Floats]:
+        """From the line at `stations` to the points, in x and in y [m]."""
+        segments = self.stations[1:-1].searchsorted(stations, side="right")
+        gaps = xy - self.points[segments] - (stations - self.stations[segments])[:, None] * self._units[segments]
+        return gaps[:, 0], gaps[:, 1]
+
+    def _window(self, low: float, high: float) -> tuple[float, float]:
+        low = min(max(low, 0.0), self.length)
+        return low, min(max(high, low), self.length)
+
+    @cached_property
+    def _lengths(self) -> Floats:
+        steps = np.diff(self.points, axis=0)
+        return np.hypot(steps[:, 0], steps[:, 1])
+
+    @cached_property
+    def _units(self) -> Floats:
+        return np.diff(self.points, axis=0) / self._lengths[:, None]
+
+    @cached_property
+    def _directions(self) -> Floats:
+        return np.unwrap(np.arctan2(self._units[:, 1], self._units[:, 0]))
+
+    @cached_property
+    def _turn_stations(self) -> Floats:
+        """Two stations around each inner vertex, between which the heading turns, and both ends."""
+        halves = 0.5 * self._lengths
+        reach = np.minimum(np.minimum(halves[1:], halves[:-1]), _TURNING_REACH)
+        inner = self.stations[1:-1, None] + reach[:, None] * np.array([-1.0, 1.0])
+        return np.concatenate(([0.0], inner.ravel(), [self.length]))
+
+    @cached_property
+    def _turn_headings(self) -> Floats:
+        return np.repeat(self._directions, 2)
+
+    @cached_property
+    def _turn_rates(self) -> Floats:
+        gaps = np.diff(self._turn_stations)
+        return np.diff(self._turn_headings) / np.where(gaps > 0.0, gaps, np.inf)
+
+    @cached_property
+    def _along(self) -> Floats:
+        """(3, n-1): [x, y, 1] relative to the first point -> distance along each segment's direction."""
+        starts = self.points[:-1] - self.points[0]
+        return np.vstack((self._units.T, -(starts * self._units).sum(axis=1)))
+
+    @cached_property
+    def _from_start(self) -> Floats:
+        """(3, n-1): [x, y, 1] -> squared distance to each segment's start, less the point's own square."""
+        starts = self.points[:-1] - self.points[0]
+        return np.vstack((-2.0 * starts.T, (starts**2).sum(axis=1)))
+
+
+def _fixed(array: Floats) -> Floats:
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,124 @@
+"""Where the ego truly is on its route, looked up once a moment for all oracles."""
+
+import math
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.geometry.boxes import box_of
+from dvca_sumo.messages import Floats, Integers
+from dvca_sumo.roadmap import RoadMap, Route
+from dvca_sumo.truth import Moment
+
+OFF_ROUTE = 15.0  # [m] farther from its line than this the ego is no longer on the route
+
+_BACK, _AHEAD = 20.0, 30.0  # [m] searched around the last known station, so that a route may cross itself
+_BESIDE = 30.0  # [m] beyond which what is behind the ego, or just out of reach, need not be told apart
+_FASTEST = 60.0  # [m/s] the search window grows so fast while the ego is off its route
+
+
+class Place(msgspec.Struct, frozen=True):
+    """Where the ego is on its route: stations along the route's line, offsets to its left."""
+
+    time: float  # [s]
+    box: Floats  # (5,) of the ego
+    station: float  # [m] of the middle of the front bumper
+    offset: float  # [m]
+    row: int  # of the route's per-station arrays, at the front bumper
+    corner_stations: Floats  # (4,) [m] front left, rear left, rear right, front right
+    corner_offsets: Floats  # (4,) [m]
+    corner_rows: Integers  # (4,)
+
+    @property
+    def is_on_route(self) -> bool:
+        """Whether the route says anything about this place."""
+        return abs(self.offset) <= OFF_ROUTE
+
+
+class Places:
+    """Places of one ego over one run, in the order of time.
+
+    Remembers the last place only. Oracles that share an instance cost one projection a moment.
+    """
+
+    def __init__(self, route: Route, roadmap: RoadMap) -> None:
+        self.route = route
+        self._roadmap = roadmap
+        self._last: Place | None = None
+        self._anchor = route.start  # [m] last station known to be right ...
+        self._anchor_time: float | None = None  # [s] ... and when
+
+    def at(self, moment: Moment) -> Place:
+        """The ego's place at `moment`, which is never earlier than the one asked for before."""
+        if self._last is None or self._last.time != moment.time:
+            self._last = self._place(moment)
+        return self._last
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no place was ever asked for: nothing of the run was seen."""
+        return self._last is None
+
+    def along(self, points: Floats, reach: float) -> tuple[Floats, Floats]:
+        """Stations and offsets [m] of points (m, 2) near the ego's last place.
+
+        Right for stations up to `reach` [m] ahead of it; what is farther ahead gets one beyond that.
+        """
+        return self.route.line.project(points, between=(self._anchor - _BESIDE, self._anchor + reach + _BESIDE))
+
+    def rows(self, stations: Floats) -> Integers:
+        """Rows of the route's arrays that hold at `stations`."""
+        last = len(self.route.lane_ids) - 1
+        found: Integers = self.route.line.stations.searchsorted(stations, side="right")
+        return np.minimum(np.maximum(found - 1, 0), last)
+
+    def lane(self, moment: Moment) -> str | None:
+        """The ego's lane: the route's where its front is inside it, else the nearest to its middle within 3 m."""
+        place = self.at(moment)
+        row = place.row
+        if place.is_on_route and self.route.lane_right[row] <= place.offset <= self.route.lane_left[row]:
+            return self.route.lane_ids[row]
+        nearest = self._roadmap.lanes_near(place.box[None, :2], 3.0)[0]
+        return nearest[0] if nearest else None
+
+    def _place(self, moment: Moment) -> Place:
+        ego, shape = moment.ego, moment.shape
+        cos, sin = math.cos(ego.heading), math.sin(ego.heading)
+        front_x, front_y = ego.x + shape.front * cos, ego.y + shape.front * sin
+        rear_x, rear_y = ego.x - shape.rear_overhang * cos, ego.y - shape.rear_overhang * sin
+        side_x, side_y = -0.5 * shape.width * sin, 0.5 * shape.width * cos
+        points = np.array(
+            [
+                [front_x, front_y],
+                [front_x + side_x, front_y + side_y],
+                [rear_x + side_x, rear_y + side_y],
+                [rear_x - side_x, rear_y - side_y],
+                [front_x - side_x, front_y - side_y],
+            ]
+        )
+        stations, offsets = self._projected(points, moment.time)
+        rows = self.rows(stations)
+        place = Place(
+            time=moment.time,
+            box=box_of(ego.x, ego.y, ego.heading, shape),
+            station=float(stations[0]),
+            offset=float(offsets[0]),
+            row=int(rows[0]),
+            corner_stations=stations[1:],
+            corner_offsets=offsets[1:],
+            corner_rows=rows[1:],
+        )
+        if place.is_on_route or self._anchor_time is None:
+            self._anchor_time = moment.time
+            self._anchor = place.station
+        return place
+
+    def _projected(self, points: Floats, time: float) -> tuple[Floats, Floats]:
+        line = self.route.line
+        lost = 0.0 if self._anchor_time is None else time - self._anchor_time
+        low, high = self._anchor - _BACK, self._anchor + _AHEAD + _FASTEST * lost
+        stations, offsets = line.project(points, between=(low, high))
+        if self._anchor_time is None and not low < stations[0] < high:
+            # The run did not begin where the route says; from then on the window follows.
+            return line.project(points)
+        return stations, offsets

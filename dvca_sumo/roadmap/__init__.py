@@ -1,0 +1,7 @@
+"""The map: lanes, connections, right of way, limits, signals and drivable area of any SUMO net."""
+
+from dvca_sumo.roadmap.lanes import Lane, RoadMapError
+from dvca_sumo.roadmap.roadmap import RoadMap
+from dvca_sumo.roadmap.route import Control, Crossing, Route, RouteError, StopLine
+
+__all__ = ["Control", "Crossing", "Lane", "RoadMap", "RoadMapError", "Route", "RouteError", "StopLine"]

@@ -1,0 +1,66 @@
+"""How much room there is to either side of a route's line."""
+
+from collections.abc import Mapping, Sequence
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.geometry.polyline import Floats, Polyline
+from dvca_sumo.roadmap.drawing import Change
+from dvca_sumo.roadmap.lanes import Lane
+
+_JUNCTION_MARGIN = 0.5  # [m] of drivable surface beside a lane on a junction
+
+
+class Bounds(msgspec.Struct, frozen=True, eq=False):
+    """Offsets of edges from the line, at each of its points [m]; left > 0 > right."""
+
+    lane_left: Floats
+    lane_right: Floats
+    road_left: Floats
+    road_right: Floats
+
+
+def bounds(
+    lanes: Mapping[str, Lane], line: Polyline, followed: Sequence[tuple[Lane, slice]], changes: Sequence[Change]
+) -> Bounds:
+    """The edges along `line`, whose points follow these lanes; during a change all lanes touched count."""
+    found = Bounds(*(np.zeros(len(line)) for _ in range(4)))
+    for lane, rows in followed:
+        _put(found, lanes, line, lane, rows, is_first=True)
+    for change in changes:
+        rows = slice(int(np.searchsorted(line.stations, change.begin)), int(np.searchsorted(line.stations, change.end)))
+        for lane in change.lanes:
+            _put(found, lanes, line, lane, rows, is_first=False)
+    for array in (found.lane_left, found.lane_right, found.road_left, found.road_right):
+        array.setflags(write=False)
+    return found
+
+
+def _put(found: Bounds, lanes: Mapping[str, Lane], line: Polyline, lane: Lane, rows: slice, *, is_first: bool) -> None:
+    centre = _centre(line, lane, rows)
+    left, right = centre + 0.5 * lane.width, centre - 0.5 * lane.width
+    margin = _JUNCTION_MARGIN if lane.is_internal else 0.0
+    sides = (left, right, left + _beside(lanes, lane, "left") + margin, right - _beside(lanes, lane, "right") - margin)
+    for array, side, widest in zip(msgspec.structs.astuple(found), sides, (np.maximum, np.minimum) * 2, strict=True):
+        array[rows] = side if is_first else widest(array[rows], side)
+
+
+def _centre(line: Polyline, lane: Lane, rows: slice) -> Floats:
+    """Offset of the lane's centre from the line; 0 where the lane does not reach (curves joining lanes)."""
+    points, headings = line.points[rows], line.headings[rows]
+    stations, _ = lane.line.project(points)
+    gaps = lane.line.poses(stations)[:, :2] - points
+    offsets = gaps[:, 1] * np.cos(headings) - gaps[:, 0] * np.sin(headings)
+    inside = (stations > 0.0) & (stations < lane.line.length)
+    return np.where(inside, offsets, 0.0)
+
+
+def _beside(lanes: Mapping[str, Lane], lane: Lane, side: str) -> float:
+    """Width of all lanes on that side which the ego may use [m]."""
+    width = 0.0
+    neighbour = getattr(lane, side)
+    while neighbour is not None:
+        width += lanes[neighbour].width
+        neighbour = getattr(lanes[neighbour], side)
+    return width

@@ -1,0 +1,57 @@
+"""Stop lines and pedestrian crossings of the movements a route takes."""
+
+import numpy as np
+
+from dvca_sumo.geometry.polyline import Polyline
+from dvca_sumo.roadmap.lanes import Lane, Movement
+from dvca_sumo.roadmap.reading import NetContents
+from dvca_sumo.roadmap.route import Control, Crossing, StopLine
+
+# SUMO's letters of right of way where no signal stands; Z: a zipper merge, where nobody may insist.
+_CONTROLS = {
+    "s": Control.STOP,
+    "w": Control.ALL_WAY_STOP,
+    "m": Control.YIELD,
+    "Z": Control.YIELD,
+    "=": Control.RIGHT_BEFORE_LEFT,
+}
+_AROUND = 10.0  # [m] before and behind a junction a crossing may still touch the route
+_SAMPLE = 0.1  # [m]
+
+
+def stop_line(net: NetContents, movement: Movement, station: float, exit_station: float) -> StopLine:
+    """The stop line before `movement`, which the route drives between two stations [m]."""
+    junction = net.junctions[movement.junction]
+    x, y = net.lanes[movement.from_lane].line.points[-1]
+    control = Control.SIGNAL if movement.signal_id else _CONTROLS.get(movement.state, Control.PRIORITY)
+    return StopLine(
+        station=station,
+        lane=movement.from_lane,
+        control=control,
+        signal_id=movement.signal_id,
+        position=(float(x), float(y)),
+        yields_to=junction.prior(movement),
+        crosses=junction.conflicting(movement),
+        exit_station=exit_station,
+    )
+
+
+def crossings(
+    net: NetContents, movement: Movement, line: Polyline, station: float, exit_station: float
+) -> list[Crossing]:
+    """The pedestrian crossings of the junction that the route passes over between two stations [m], in order."""
+    found = []
+    for lane in net.junctions[movement.junction].crossings:
+        span = (max(station - _AROUND, 0.0), min(exit_station + _AROUND, line.length))
+        covered = _covered(net.lanes[lane], line, *span)
+        if covered is not None:
+            found.append(Crossing(lane, *covered))
+    return sorted(found, key=lambda crossing: crossing.start_station)
+
+
+def _covered(lane: Lane, line: Polyline, begin: float, end: float) -> tuple[float, float] | None:
+    """Where `line` lies on the crossing, to the nearest decimetre."""
+    stations = np.arange(begin, end, _SAMPLE)
+    along, offsets = lane.line.project(line.poses(stations)[:, :2])
+    on = stations[(np.abs(offsets) <= 0.5 * lane.width) & (along > 0.0) & (along < lane.line.length)]
+    return (float(on[0]), float(on[-1])) if len(on) else None

@@ -1,0 +1,64 @@
+"""The ego's way through the map, as a stack plans on it."""
+
+import enum
+
+import msgspec
+
+from dvca_sumo.geometry.polyline import Floats, Polyline
+
+
+class RouteError(ValueError):
+    """The edges cannot be driven as asked; says in one line which and why."""
+
+
+class Control(enum.StrEnum):
+    """What regulates the right of way where the ego enters a junction."""
+
+    SIGNAL = "signal"
+    STOP = "stop"
+    ALL_WAY_STOP = "all_way_stop"
+    YIELD = "yield"
+    RIGHT_BEFORE_LEFT = "right_before_left"
+    PRIORITY = "priority"
+
+
+class StopLine(msgspec.Struct, frozen=True, eq=False):
+    """Where the route enters a junction, and whom it meets there."""
+
+    station: float  # [m] end of the approach lane
+    lane: str  # approach lane
+    control: Control
+    signal_id: str | None  # "tls/linkIndex", with SIGNAL only
+    position: tuple[float, float]  # [m] x, y
+    yields_to: frozenset[str]  # lanes of movements with priority; with SIGNAL: under permissive green or dark
+    crosses: frozenset[str]  # lanes of all movements whose paths conflict
+    exit_station: float  # [m] where the route leaves the junction
+
+
+class Crossing(msgspec.Struct, frozen=True, eq=False):
+    """A pedestrian crossing the route passes over."""
+
+    lane: str
+    start_station: float  # [m]
+    end_station: float  # [m]
+
+
+class Route(msgspec.Struct, frozen=True, eq=False):
+    """The ego's reference line and everything known along it.
+
+    Arrays hold one value per point of `line`; points are 1 m apart, the last one possibly closer.
+    Lateral edges are offsets from `line` [m], left > 0 > right. All arrays are read-only.
+    """
+
+    line: Polyline  # through lanes and junctions, lane changes blended in
+    lane_ids: tuple[str, ...]
+    speed_limits: Floats  # [m/s]
+    curvatures: Floats  # [1/m]
+    lane_left: Floats  # [m] edges of the lane, of both lanes during a lane change
+    lane_right: Floats  # [m]
+    road_left: Floats  # [m] edges of all lanes in this direction the ego may use
+    road_right: Floats  # [m]
+    start: float  # [m] front bumper at departure
+    destination: float  # [m] where the front bumper shall stop
+    stop_lines: tuple[StopLine, ...]  # by station
+    crossings: tuple[Crossing, ...]  # by station

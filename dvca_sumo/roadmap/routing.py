@@ -1,0 +1,174 @@
+"""From a list of edges to a Route: choose lanes, draw them, smooth the line, note what lies along it."""
+
+from collections.abc import Iterator, Sequence
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.geometry.polyline import Floats, Polyline
+from dvca_sumo.roadmap.bounds import bounds
+from dvca_sumo.roadmap.drawing import Change, Drawing, Stretch
+from dvca_sumo.roadmap.lane_sequence import Leg, change_length, lane_sequence
+from dvca_sumo.roadmap.lanes import Lane, Movement
+from dvca_sumo.roadmap.reading import NetContents
+from dvca_sumo.roadmap.right_of_way import crossings, stop_line
+from dvca_sumo.roadmap.route import Route, RouteError
+from dvca_sumo.roadmap.smoothing import smoothed
+
+_BEFORE = 20.0  # [m] of lane shown behind the start, as far as there is any
+_RUN_UP = 10.0  # [m] of line behind the start in any case: the rear axle needs a line under it
+_BEYOND = 100.0  # [m] shown behind the destination, as far as the net goes on
+_SETTLED = 10.0  # [m] at most is waited before a lane change, after a junction or the start
+
+
+class _Passage(msgspec.Struct, frozen=True, eq=False):
+    """A movement the line takes, between two stations [m]."""
+
+    movement: Movement
+    begin: float
+    end: float
+
+
+class _Plan(msgspec.Struct, frozen=True, eq=False):
+    """The rough line with all that is known along it; stations are on it [m]."""
+
+    line: Polyline
+    stretches: tuple[Stretch, ...]
+    changes: tuple[Change, ...]
+    passages: tuple[_Passage, ...]
+    start: float
+    destination: float
+
+
+def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arrival: tuple[str | None, float]) -> Route:
+    """The route along `edges` between two lane positions, as in `RoadMap.route`."""
+    _check(net, edges, start, arrival)
+    plan = _drawn(net, lane_sequence(net, edges, start, arrival), start[1], arrival[1])
+    begin = min(max(plan.start - _BEFORE, 0.0), plan.start - _RUN_UP)
+    end = min(plan.destination + _BEYOND, plan.line.length)
+    line, along = smoothed(_clipped(plan.line, begin, end))
+    along = along + begin
+
+    def moved(station: float) -> float:
+        return float(np.interp(station, along, line.stations))
+
+    owners = np.searchsorted([stretch.begin for stretch in plan.stretches], along, side="right") - 1
+    followed = [plan.stretches[owner].lane for owner in np.maximum(owners, 0)]
+    changes = [Change(change.lanes, moved(change.begin), moved(change.end)) for change in plan.changes]
+    edges_of = bounds(net.lanes, line, list(_runs(followed)), changes)
+    passages = [
+        _Passage(passage.movement, moved(passage.begin), moved(passage.end))
+        for passage in plan.passages
+        if begin <= passage.begin < end
+    ]
+    return Route(
+        line=line,
+        lane_ids=tuple(lane.id for lane in followed),
+        speed_limits=_fixed(np.array([lane.speed_limit for lane in followed])),
+        curvatures=line.curvatures,
+        lane_left=edges_of.lane_left,
+        lane_right=edges_of.lane_right,
+        road_left=edges_of.road_left,
+        road_right=edges_of.road_right,
+        start=moved(plan.start),
+        destination=moved(plan.destination),
+        stop_lines=tuple(stop_line(net, p.movement, p.begin, p.end) for p in passages),
+        crossings=tuple(crossing for p in passages for crossing in crossings(net, p.movement, line, p.begin, p.end)),
+    )
+
+
+def _check(net: NetContents, edges: Sequence[str], start: tuple[str, float], arrival: tuple[str | None, float]) -> None:
+    if not edges:
+        raise RouteError("a route needs at least one edge")
+    for edge in edges:
+        if edge not in net.edges:
+            raise RouteError(f"edge {edge!r} is not in the net")
+    for lane, edge in ((start[0], edges[0]), (arrival[0], edges[-1])):
+        if lane is None:
+            continue
+        if lane not in net.edges[edge]:
+            raise RouteError(f"lane {lane!r} is not on edge {edge!r}")
+        if not net.lanes[lane].is_drivable:
+            raise RouteError(f"lane {lane!r} is closed to this vehicle class")
+    if len(edges) == 1 and arrival[1] < start[1]:
+        raise RouteError(f"the destination at {arrival[1]:g} m lies behind the start at {start[1]:g} m on {edges[0]!r}")
+
+
+def _drawn(net: NetContents, legs: Sequence[Leg], start: float, arrival: float) -> _Plan:
+    drawing = Drawing()
+    first, last = legs[0].entry, legs[-1].exit
+    spans = []
+    passages = []
+    entered: tuple[Movement, float] | None = None
+    for order, leg in enumerate(_continued(net, legs, _BEYOND - last.line.length + last.station(arrival))):
+        begin = first.station(start) if order == 0 else 0.0
+        end = leg.entry.station(arrival) if order == len(legs) - 1 else leg.entry.line.length
+        spans.append(_draw_leg(net, drawing, leg, begin, end))
+        if entered is not None:
+            passages.append(_Passage(*entered, spans[-1][0]))
+        if leg.movement is not None:
+            entered = (leg.movement, spans[-1][1])
+            for lane in leg.movement.internal:
+                drawing.follow(net.lanes[lane])
+    line = Polyline(drawing.points)
+    return _Plan(
+        line=line,
+        stretches=tuple(drawing.stretches),
+        changes=tuple(drawing.changes),
+        passages=tuple(passages),
+        start=_located(line, first, first.station(start), spans[0]),
+        destination=_located(line, last, last.station(arrival), spans[len(legs) - 1]),
+    )
+
+
+def _continued(net: NetContents, legs: Sequence[Leg], distance: float) -> Iterator[Leg]:
+    """The legs, and where the net goes on, further ones for `distance` [m]: straight on if possible."""
+    yield from legs[:-1]
+    leg = legs[-1]
+    while distance > 0.0:
+        ahead = [m for m in net.movements.get(leg.exit.id, ()) if m.is_drivable and m.direction not in "tT"]
+        if not ahead:
+            break
+        movement = min(ahead, key=lambda m: m.direction != "s")
+        yield Leg(leg.entry, leg.exit, movement)
+        leg = Leg(net.lanes[movement.to_lane], net.lanes[movement.to_lane], None)
+        distance -= leg.exit.line.length + sum(net.lanes[lane].line.length for lane in movement.internal)
+    yield leg
+
+
+def _draw_leg(net: NetContents, drawing: Drawing, leg: Leg, begin: float, end: float) -> tuple[float, float]:
+    """Draw one edge; a lane change takes place between two stations of the entry lane [m]."""
+    if leg.entry is leg.exit:
+        return drawing.follow(leg.entry)
+    direction = 1 if leg.exit.index > leg.entry.index else -1
+    lane_ids = net.edges[leg.entry.edge]
+    lanes = [net.lanes[lane_ids[i]] for i in range(leg.entry.index, leg.exit.index + direction, direction)]
+    wait = min(_SETTLED, 0.1 * (end - begin))
+    length = min(change_length(leg.entry, len(lanes) - 1), end - begin - 2.0 * wait)
+    return drawing.cross(lanes, (begin + wait, begin + wait + length))
+
+
+def _located(line: Polyline, lane: Lane, station: float, span: tuple[float, float]) -> float:
+    """The station on `line`, within `span`, abreast of a station of `lane` [m]."""
+    found, _ = line.project(lane.line.poses([station])[:, :2], between=span)
+    return float(found[0])
+
+
+def _clipped(line: Polyline, begin: float, end: float) -> Polyline:
+    """The part of `line` between two stations [m]; it goes on straight beyond the line's ends."""
+    inner = line.stations[(line.stations > begin) & (line.stations < end)]
+    return Polyline(line.poses(np.concatenate(([begin], inner, [end])))[:, :2])
+
+
+def _runs(followed: Sequence[Lane]) -> Iterator[tuple[Lane, slice]]:
+    """Each lane with the rows along which it is followed."""
+    begin = 0
+    for row in range(1, len(followed) + 1):
+        if row == len(followed) or followed[row] is not followed[begin]:
+            yield followed[begin], slice(begin, row)
+            begin = row
+
+
+def _fixed(array: Floats) -> Floats:
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,251 @@
+"""One ego's closed loop: sense, five components, move, be judged."""
+
+import math
+from typing import NamedTuple
+
+from dvca_sumo.geometry.randomness import uniforms
+from dvca_sumo.interventions import Fault, Gate, Intervention, Occasion, state_of
+from dvca_sumo.interventions.effects import EFFECTS
+from dvca_sumo.messages import (
+    COMPONENTS,
+    Component,
+    ControlCommand,
+    LocalizationEstimate,
+    Message,
+    MessageId,
+    PredictedObjects,
+    TrackedObjects,
+    Trajectory,
+)
+from dvca_sumo.oracles import Oracle
+from dvca_sumo.record import TICK, Execution, Record, moved_on
+from dvca_sumo.run.task import Task
+from dvca_sumo.stack.ideal import SUBSTITUTES
+from dvca_sumo.stack.reference import Stack, StackError
+from dvca_sumo.thresholds import Thresholds
+from dvca_sumo.truth import EgoTruth, Moment
+from dvca_sumo.violations import Ending, Violation
+from dvca_sumo.world import ControlCommandError, Ego
+
+TICKS_PER_STEP = 10
+_ARRIVED_WITHIN = 3.0  # [m]
+_LOST_BEYOND = 60.0  # [m] past its destination an ego will not come back
+_PHASE_STREAM = 101
+
+
+class Channels:
+    """The latest message of each component; None until there is one."""
+
+    def __init__(self) -> None:
+        self.localization: LocalizationEstimate | None = None
+        self.perception: TrackedObjects | None = None
+        self.prediction: PredictedObjects | None = None
+        self.planning: Trajectory | None = None
+        self.control: ControlCommand | None = None
+
+
+class Judging(NamedTuple):
+    """The oracles of one drive, and what they hold it against."""
+
+    oracles: tuple[Oracle, ...]
+    thresholds: Thresholds
+
+
+class Drive:
+    """One ego's drive, advanced by one world step at a time."""
+
+    def __init__(self, ego: Ego, stack: Stack, judging: Judging, task: Task, latest: float) -> None:
+        """A drive that ends at `latest` [s] unless its task stops it earlier."""
+        self.ego = ego
+        self._thresholds = judging.thresholds
+        self._oracles = judging.oracles
+        self._stack = stack
+        self._task = task
+        self._latest = latest
+        self._phases = _phases(task)
+        self._interventions = {
+            component: [(one, Gate(one.selection)) for one in task.interventions if one.component == component]
+            for component in COMPONENTS
+        }
+        self._channels = Channels()
+        self._steps = {
+            Component.LOCALIZATION: self._localize,
+            Component.PERCEPTION: self._perceive,
+            Component.PREDICTION: self._predict,
+            Component.PLANNING: self._plan,
+            Component.CONTROL: self._control,
+        }
+        self._tick = 0
+        self._start = ego.vehicle.truth.time
+        self._contact = self._breach = math.inf  # [s] time of the first contact, of the first violation
+        self._ending: Ending | None = None
+        self._executions: dict[Component, list[Execution]] = {component: [] for component in COMPONENTS}
+        self._altered: dict[Component, list[int]] = {component: [] for component in COMPONENTS}
+        self._path: list[EgoTruth] = []
+        self._stations: list[float] = []
+        self._moments: list[Moment] = []
+        self._violations: list[Violation] = []
+
+    def cycle(self, moment: Moment) -> bool:
+        """Judge this step's truth, then drive to the next step; False when the drive is over.
+
+        Raises:
+            StackError: A component failed; which, in which cycle, and its own words.
+        """
+        self._moments.append(moment)
+        self._judge(moment)
+        self._ending = self._ended(moment)
+        if self._ending is not None:
+            return False
+        station = self.ego.station()
+        for phase in range(TICKS_PER_STEP):
+            truth = self.ego.vehicle.truth
+            self._path.append(truth)
+            self._stations.append(station)
+            for component in COMPONENTS:
+                if self._phases[component] in (None, phase):
+                    self._execute(component, moment)
+            command = self._channels.control
+            assert command is not None  # control always answers
+            try:
+                self.ego.vehicle.advance(command, TICK)
+            except ControlCommandError as error:
+                raise StackError(str(error)) from None
+            station += truth.speed * TICK
+            self._tick += 1
+        return True
+
+    def record(self, simulated: float) -> Record:
+        """What the drive left, `simulated` [s] of SUMO time having passed."""
+        ending = self._ending or Ending.CUT
+        judgements = tuple(oracle.conclude(ending) for oracle in self._oracles)
+        known = {id(violation) for violation in self._violations}
+        late = [one for judged in judgements for one in judged.violations if id(one) not in known]
+        self._violations.extend(one for one in late if one.time <= self._contact)
+        return Record(
+            ego=self.ego.name,
+            route=self.ego.route,
+            thresholds=self._thresholds,
+            sensor_range=self._stack.sensor_range,
+            start=self._start,
+            executions=self._executions,
+            altered=self._altered,
+            path=self._path,
+            stations=self._stations,
+            moments=self._moments,
+            violations=sorted(self._violations, key=lambda violation: violation.time),
+            judgements=judgements,
+            ending=ending,
+            simulated=simulated,
+        )
+
+    def _execute(self, component: Component, moment: Moment) -> None:
+        index = len(self._executions[component])
+        try:
+            message = self._steps[component](moment)
+        except Exception as error:
+            cycle = self._tick // TICKS_PER_STEP
+            said = f"{type(error).__name__}: {error}"
+            raise StackError(f"{component} raised {said} in cycle {cycle} ({self._path[-1].time:.2f} s)") from error
+        if message is None:  # its input has not arrived yet
+            return
+        published = self._intervened(component, index, message, moment)
+        self._executions[component].append(Execution(self._tick, published))
+        if published is not None:
+            setattr(self._channels, component.value, published)
+
+    def _intervened(self, component: Component, index: int, message: Message, moment: Moment) -> Message | None:
+        interventions = self._interventions[component]
+        if not interventions:
+            return message
+        truth = self._path[-1]
+        believed = message if isinstance(message, LocalizationEstimate) else self._channels.localization
+        assert believed is not None  # localization is the first to speak
+        occasion = Occasion(
+            message=MessageId(component, index),
+            elapsed=round(truth.time - self._start, 9),
+            state=state_of(self._stations[-1], truth.speed, truth.acceleration),
+            moment=moved_on(moment, truth),
+            believed=believed,
+            trajectory=self._channels.planning,
+            route=self.ego.route,
+            sensor_range=self._stack.sensor_range,
+            futures=self._task.futures,
+        )
+        result: Message | None = message
+        for intervention, gate in interventions:
+            if gate.admits(occasion):
+                result = self._replaced(intervention, result, occasion)
+        return result
+
+    def _replaced(self, intervention: Intervention, message: Message | None, occasion: Occasion) -> Message | None:
+        if not isinstance(intervention, Fault):
+            return SUBSTITUTES[intervention.component](occasion)
+        if message is None:
+            return None
+        altered = EFFECTS[intervention.effect](message, intervention.parameters, occasion)
+        if altered is not message:
+            self._altered[intervention.component].append(occasion.message.index)
+        return altered
+
+    def _localize(self, moment: Moment) -> Message:  # noqa: ARG002 - all steps are called alike
+        truth, sensors = self._path[-1], self._stack.sensors
+        cycle, phase = divmod(self._tick, TICKS_PER_STEP)
+        fix = sensors.fix(truth, cycle) if phase == 0 else None
+        return self._stack.localization.step(sensors.odometry(truth, self._tick), fix)
+
+    def _perceive(self, moment: Moment) -> Message | None:
+        believed = self._channels.localization
+        if believed is None:
+            return None
+        detections = self._stack.sensors.detections(moved_on(moment, self._path[-1]), self._tick // TICKS_PER_STEP)
+        return self._stack.perception.step(detections, believed)
+
+    def _predict(self, moment: Moment) -> Message | None:  # noqa: ARG002
+        tracked = self._channels.perception
+        return None if tracked is None else self._stack.prediction.step(tracked)
+
+    def _plan(self, moment: Moment) -> Message | None:  # noqa: ARG002
+        channels = self._channels
+        if channels.localization is None or channels.prediction is None or channels.perception is None:
+            return None
+        return self._stack.planning.step(channels.localization, channels.prediction, channels.perception.signals)
+
+    def _control(self, moment: Moment) -> Message | None:  # noqa: ARG002
+        believed = self._channels.localization
+        return None if believed is None else self._stack.control.step(believed, self._channels.planning)
+
+    def _judge(self, moment: Moment) -> None:
+        if moment.time > self._contact:
+            return  # what follows a crash is not simulated truly
+        for oracle in self._oracles:
+            violation = oracle.observe(moment)
+            while violation is not None:
+                self._violations.append(violation)
+                self._breach = min(self._breach, moment.time)
+                if violation.contact is not None:
+                    self._contact = moment.time
+                violation = None
+
+    def _ended(self, moment: Moment) -> Ending | None:
+        rule, beyond = self._task.stop, self.ego.station() + self.ego.shape.front - self.ego.route.destination
+        if abs(beyond) <= _ARRIVED_WITHIN and moment.ego.speed == 0.0:
+            return Ending.ARRIVED
+        if moment.time >= self._latest - TICK or beyond > _LOST_BEYOND:
+            return Ending.TIME_OVER
+        stop = min(rule.at, self._breach + rule.after_violation, self._contact + rule.after_contact)
+        return Ending.CUT if moment.time >= stop - TICK else None
+
+
+def _phases(task: Task) -> dict[Component, int | None]:
+    """Tick within the world step at which each component runs; None: at every tick."""
+    drawn = [0, 0, 0]
+    if task.jitter is not None:
+        drawn = [int(draw * TICKS_PER_STEP) for draw in uniforms(task.seed, _PHASE_STREAM, 0, [0], 3)[0]]
+    return {
+        Component.LOCALIZATION: None,
+        Component.PERCEPTION: drawn[0],
+        Component.PREDICTION: drawn[1],
+        Component.PLANNING: drawn[2],
+        Component.CONTROL: None,
+    }

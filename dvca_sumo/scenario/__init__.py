@@ -1,0 +1,130 @@
+"""What is run: a user's SUMO configuration, its ego, and the settings a truthful run needs."""
+
+import os
+from pathlib import Path
+
+import msgspec
+
+from dvca_sumo.scenario.configuration import Configuration, read_configuration, seconds
+from dvca_sumo.scenario.ego import AUTO, arrival_position, find_ego
+from dvca_sumo.scenario.errors import ScenarioError
+from dvca_sumo.scenario.silence import silenced
+
+__all__ = [
+    "AUTO",
+    "STEP_LENGTH",
+    "Override",
+    "Scenario",
+    "ScenarioError",
+    "arrival_position",
+    "load_scenario",
+    "silenced",
+]
+
+STEP_LENGTH = 0.1  # [s] of every run, whatever the sumocfg says
+
+_SUMO_SEED = 23423  # SUMO's own default, so that a plain `sumo -c` shows the same traffic
+
+
+class Override(msgspec.Struct, frozen=True):
+    """A SUMO option that a run sets differently from the user's configuration."""
+
+    option: str
+    configured: str | None  # None: not set there
+    used: str
+    reason: str
+
+
+class Scenario(msgspec.Struct, frozen=True):
+    """One runnable scenario. Two equal scenarios give the same run, bit for bit."""
+
+    configuration: Configuration
+    ego: str  # vehicle id, or AUTO
+    seed: int
+    begin: float  # [s]
+    end: float | None  # [s]; None: as long as the ego's trip may take
+    overrides: tuple[Override, ...]
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """SUMO's command line, but for the additional files (see `silenced`)."""
+        words = ["-c", str(self.configuration.path)]
+        for override in self.overrides:
+            words += [f"--{override.option}", override.used]
+        return tuple(words)
+
+
+def load_scenario(
+    path: Path, ego: str | None = None, seed: int | None = None, begin: float | None = None, end: float | None = None
+) -> Scenario:
+    """Read a sumocfg and decide everything a run of it needs to know.
+
+    Args:
+        path: The user's SUMO configuration; nothing is ever written beside it.
+        ego: Vehicle id, "auto", or None to look for a marked vehicle, then for the id "ego".
+        seed: For SUMO's drivers and the ADS's sensors; None takes the configuration's.
+        begin: [s] Start of the simulation; None takes the configuration's.
+        end: [s] Latest end of the simulation; None takes the configuration's, if any.
+
+    Raises:
+        ScenarioError: The scenario cannot be run as given.
+    """
+    configuration = read_configuration(path)
+    options = configuration.options
+    chosen_seed = seed if seed is not None else _whole(options.get("seed", str(_SUMO_SEED)), "seed")
+    chosen_begin = begin if begin is not None else seconds(options.get("begin", "0"), "begin")
+    configured_end = seconds(options["end"], "end") if "end" in options else -1.0
+    chosen_end = end if end is not None else (configured_end if configured_end > 0 else None)
+    if chosen_end is not None and chosen_end <= chosen_begin:
+        raise ScenarioError(f"the scenario ends at {chosen_end:g} s, not after its begin at {chosen_begin:g} s")
+    return Scenario(
+        configuration=configuration,
+        ego=find_ego(configuration, ego),
+        seed=chosen_seed,
+        begin=chosen_begin,
+        end=chosen_end,
+        overrides=_overrides(configuration, chosen_seed, chosen_begin),
+    )
+
+
+def _overrides(configuration: Configuration, seed: int, begin: float) -> tuple[Override, ...]:
+    options = configuration.options
+    wanted = [
+        ("seed", str(seed), "explicit seed"),
+        ("random", "false", "equal runs must repeat"),
+        ("begin", f"{begin:g}", "asked for"),
+        ("end", "-1", "the run ends with the ego's trip"),
+        ("step-length", f"{STEP_LENGTH:g}", "world step"),
+        ("collision.action", "warn", "colliding vehicles must not vanish"),
+        ("collision.check-junctions", "true", "collisions on junctions count"),
+        ("collision.mingap-factor", "0", "contact, not a small gap, is a collision"),
+        ("threads", "1", "repeatable and forkable"),
+        ("device.rerouting.threads", "0", "repeatable and forkable"),
+        ("remote-port", "0", "a port makes SUMO wait for a client"),
+        ("xml-validation", "never", "schemas may be out of reach"),
+        ("xml-validation.net", "never", "schemas may be out of reach"),
+        ("no-step-log", "true", "terminal"),
+        ("duration-log.disable", "true", "terminal"),
+        ("verbose", "false", "terminal"),
+    ]
+    step = seconds(options.get("step-length", "1"), "step-length")
+    if step > STEP_LENGTH and "default.action-step-length" not in options:
+        wanted.append(("default.action-step-length", f"{step:g}", "drivers keep their reaction interval"))
+    wanted += [(name, os.devnull, "nothing is written for a run") for name in configuration.outputs]
+    never = {"save-state.times": "1e9", "save-state.period": "-1"}
+    wanted += [(name, used, "nothing is written for a run") for name, used in never.items() if name in options]
+    wanted += [
+        (name, "", "files of the terminal-less run") for name in ("gui-settings-file", "output-prefix") if name in options
+    ]
+    return tuple(
+        Override(option, options.get(option), used, reason)
+        for option, used, reason in wanted
+        if options.get(option) != used
+    )
+
+
+def _whole(text: str, option: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise ScenarioError(f"option {option} is no whole number: {text!r}") from None

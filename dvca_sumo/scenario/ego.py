@@ -1,0 +1,101 @@
+"""Which vehicle of a scenario is the ego."""
+
+import difflib
+import io
+import re
+import xml.etree.ElementTree as ET
+
+from dvca_sumo.scenario.configuration import Configuration, opened_text
+from dvca_sumo.scenario.errors import ScenarioError
+
+AUTO = "auto"
+_VEHICLE = re.compile(r"<\s*(vehicle|trip|flow)\b[^>]*?\bid\s*=\s*[\"']([^\"']*)[\"']")
+_LISTED = 5
+
+
+def find_ego(configuration: Configuration, asked: str | None) -> str:
+    """The id of the ego, or `AUTO` when the choice is left to the run.
+
+    In this order: `asked` (`--ego`); the vehicle with `<param key="dvca.ego" value="true"/>`; the
+    vehicle id `ego`.
+
+    Raises:
+        ScenarioError: There is no such vehicle; candidates are listed.
+    """
+    if asked == AUTO:
+        return AUTO
+    names: list[str] = []
+    marked: list[str] = []
+    for path in (*configuration.routes, *configuration.additionals):
+        text = opened_text(path)
+        if "dvca.ego" in text:
+            marked.extend(_marked(text, str(path)))
+        for element, name in _VEHICLE.findall(text):
+            names.append(f"{name}.0" if element == "flow" else name)
+    flows = {name.rsplit(".", 1)[0] for name in names if name.endswith(".0")}
+    if asked is not None:
+        if asked in names or asked.rsplit(".", 1)[0] in flows:
+            return asked
+        close = difflib.get_close_matches(asked, names, n=1)
+        hint = f"did you mean {close[0]}?" if close else _candidates(names)
+        raise ScenarioError(f"no vehicle {asked!r} in the scenario ({hint})")
+    if len(marked) > 1:
+        raise ScenarioError(f"several vehicles are marked dvca.ego: {', '.join(marked)}; choose one with --ego ID")
+    if marked:
+        return marked[0]
+    if "ego" in names:
+        return "ego"
+    raise ScenarioError(
+        f"{configuration.path} names no ego: use --ego ID, --ego auto, or mark a vehicle with "
+        f'<param key="dvca.ego" value="true"/> ({_candidates(names)})'
+    )
+
+
+def arrival_position(configuration: Configuration, ego: str) -> float | None:
+    """Where on its last edge the ego shall arrive [m]; negative counts from the end; None: at the end.
+
+    SUMO does not tell it of a running vehicle, so it is read from the vehicle's own definition.
+
+    Raises:
+        ScenarioError: The definition holds something that is no position.
+    """
+    for path in (*configuration.routes, *configuration.additionals):
+        for match in _VEHICLE.finditer(text := opened_text(path)):
+            name = match.group(2)
+            if name == ego or (match.group(1) == "flow" and ego.rpartition(".")[0] == name):
+                tag = text[match.start() : text.index(">", match.start())]
+                found = re.search(r"\barrivalPos\s*=\s*[\"']([^\"']*)", tag)
+                return _position(found.group(1), ego) if found else None
+    return None
+
+
+def _position(text: str, ego: str) -> float | None:
+    if text in ("max", "random"):
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise ScenarioError(f"arrivalPos of {ego} is no position: {text!r} (allowed: metres, max, random)") from None
+
+
+def _candidates(names: list[str]) -> str:
+    if not names:
+        return "the scenario has no vehicles"
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return "candidates: " + ", ".join(names[:_LISTED]) + more
+
+
+def _marked(text: str, path: str) -> list[str]:
+    found: list[str] = []
+    current: ET.Element | None = None
+    try:
+        for event, element in ET.iterparse(io.StringIO(text), ("start", "end")):  # noqa: S314 - the user's own file
+            if event == "start" and element.tag in ("vehicle", "trip", "flow"):
+                current = element
+            elif event == "end" and element.tag == "param" and element.get("key") == "dvca.ego" and current is not None:
+                if (element.get("value") or "").lower() == "true":
+                    name = current.get("id", "")
+                    found.append(f"{name}.0" if current.tag == "flow" else name)
+    except ET.ParseError as error:
+        raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
+    return found

@@ -1,0 +1,68 @@
+"""Copies of additional files whose outputs go nowhere.
+
+Detectors and similar elements name their own output file, relative to the additional file. A run
+must not write into the user's folder, so files with such elements are copied with the output
+attribute pointed to the null device and every relative input path made absolute.
+"""
+
+import os
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+from dvca_sumo.scenario.configuration import opened_text
+from dvca_sumo.scenario.errors import ScenarioError
+
+# Element -> attribute with the path of a file that SUMO writes.
+WRITTEN = {
+    "inductionLoop": "file",
+    "e1Detector": "file",
+    "instantInductionLoop": "file",
+    "laneAreaDetector": "file",
+    "e2Detector": "file",
+    "entryExitDetector": "file",
+    "e3Detector": "file",
+    "edgeData": "file",
+    "laneData": "file",
+    "routeProbe": "file",
+    "vTypeProbe": "file",
+    "calibrator": "output",
+    "timedEvent": "dest",
+}
+# Element -> attribute with the path of a file that SUMO reads.
+_READ = {"variableSpeedSign": "file", "rerouter": "file", "include": "href", "poly": "imgFile", "poi": "imgFile"}
+_SUSPICIOUS = re.compile(r"<\s*(?:" + "|".join([*WRITTEN, "include"]) + r")\b")
+
+
+def silenced(additionals: tuple[Path, ...], folder: Path) -> tuple[Path, ...]:
+    """The same additional files, in order, those that write output replaced by silent copies in `folder`.
+
+    Raises:
+        ScenarioError: A file to be copied is not well-formed XML.
+    """
+    return tuple(_silenced(path, folder / str(number)) for number, path in enumerate(additionals))
+
+
+def _silenced(path: Path, folder: Path) -> Path:
+    text = opened_text(path)
+    if not _SUSPICIOUS.search(text):
+        return path
+    try:
+        root = ET.fromstring(text)  # noqa: S314 - the user's own file, read as SUMO itself reads it
+    except ET.ParseError as error:
+        raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
+    for number, element in enumerate(root.iter()):
+        written = WRITTEN.get(element.tag)
+        if written is not None and element.get(written):
+            element.set(written, os.devnull)
+        read = _READ.get(element.tag)
+        source = element.get(read) if read is not None else None
+        if read is not None and source:
+            target = (path.parent / source).resolve()
+            if element.tag == "include" and target.is_file():
+                target = _silenced(target, folder / str(number))
+            element.set(read, str(target))
+    folder.mkdir(parents=True, exist_ok=True)
+    copy = folder / path.name.removesuffix(".gz")
+    ET.ElementTree(root).write(copy, encoding="utf-8", xml_declaration=True)
+    return copy

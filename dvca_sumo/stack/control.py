@@ -1,0 +1,180 @@
+"""Control: believed pose and trajectory -> actuator command, 100 times a second.
+
+Lateral: the error of a rear axle against a path obeys e'' = curvature - path curvature per metre driven
+(small angles), a double integrator; its linear-quadratic regulator is known in closed form (gains 1/d^2
+on offset and sqrt(2)/d on heading for a settling distance d), so no Riccati equation is solved. The
+path's own curvature is fed forward, taken as far ahead as the steering lags.
+Longitudinal: the trajectory's acceleration is fed forward; PI on speed and P on position correct it.
+"""
+
+import math
+from bisect import bisect_right
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.geometry.angles import wrapped
+from dvca_sumo.messages import HEADING, ControlCommand, LocalizationEstimate, T, Trajectory, VehicleShape, X, Y
+
+
+class ControlConfig(msgspec.Struct, frozen=True):
+    """Gains and limits of the tracking controller."""
+
+    period: float = 0.01  # [s] from step to step
+    settling_time: float = 0.6  # [s] settling distance of a lateral error, by speed
+    min_settling_distance: float = 3.0  # [m] and at least
+    max_approach_angle: float = 0.4  # [rad] to the path, when far off it
+    steering_preview: float = 0.15  # [s] the path's curvature is taken this far ahead
+    max_steering: float = 0.55  # [rad]
+    max_lateral_acceleration: float = 6.0  # [m/s^2]
+    acceleration_preview: float = 0.2  # [s] the trajectory's acceleration is taken this far ahead
+    position_gain: float = 0.6  # [1/s^2]
+    max_position_error: float = 3.0  # [m] larger ones count as this
+    speed_gain: float = 1.5  # [1/s]
+    speed_integral_gain: float = 0.1  # [1/s^2]
+    max_integral: float = 0.3  # [m/s^2] the integral's share of the acceleration
+    max_acceleration: float = 3.0  # [m/s^2]
+    max_braking: float = 8.0  # [m/s^2] positive number
+    standstill_speed: float = 0.1  # [m/s] a trajectory slower than this wants to stand
+    standstill_preview: float = 0.5  # [s] unless it is faster this much later
+    standstill_braking: float = 2.0  # [m/s^2] held while standing
+    stop_braking: float = 3.0  # [m/s^2] when there is nothing (any more) to follow
+
+
+Row = tuple[float, float, float, float, float, float]  # x, y, heading (unwrapped), speed, acceleration, curvature
+
+
+class _Track:
+    """A trajectory as plain numbers, looked up by time or by distance along it; ends are held."""
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        points = trajectory.points
+        columns = points[:, X:].copy()
+        turns = np.rint(np.diff(points[:, HEADING]) / (2.0 * math.pi))
+        columns[1:, HEADING - X] -= 2.0 * math.pi * np.cumsum(turns)  # np.unwrap, five times as fast
+        steps = np.hypot(np.diff(points[:, X]), np.diff(points[:, Y]))
+        self.source = trajectory
+        self.is_finite = bool(np.isfinite(points).all())
+        self.times: list[float] = points[:, T].tolist()
+        self._stations: list[float] = [0.0, *np.cumsum(steps).tolist()]
+        self._rows: list[Row] = list(map(tuple, columns.tolist()))
+
+    def at_time(self, time: float) -> tuple[Row, float]:
+        """The row at `time` [s] after the trajectory was made, and its station [m]."""
+        i, share = _place(self.times, time)
+        return self._row(i, share), (1.0 - share) * self._stations[i] + share * self._stations[i + 1]
+
+    def at_station(self, station: float) -> Row:
+        """The row at `station` [m] along the trajectory."""
+        return self._row(*_place(self._stations, station))
+
+    def _row(self, i: int, share: float) -> Row:
+        x, y, heading, speed, acceleration, curvature = self._rows[i]
+        x1, y1, heading1, speed1, acceleration1, curvature1 = self._rows[i + 1]
+        return (
+            x + share * (x1 - x),
+            y + share * (y1 - y),
+            heading + share * (heading1 - heading),
+            speed + share * (speed1 - speed),
+            acceleration + share * (acceleration1 - acceleration),
+            curvature + share * (curvature1 - curvature),
+        )
+
+
+def _place(knots: list[float], value: float) -> tuple[int, float]:
+    """The interval of ascending `knots` that holds `value`, and how far through it lies, in [0, 1]."""
+    i = min(max(bisect_right(knots, value) - 1, 0), len(knots) - 2)
+    width = knots[i + 1] - knots[i]
+    share = (value - knots[i]) / width if width > 0.0 else 1.0
+    return i, min(max(share, 0.0), 1.0)
+
+
+class TrackingController:
+    """Follows the newest trajectory in time and space; stops where there is none to follow.
+
+    Its only memory is the speed error's integral (and the numbers of the trajectory in hand).
+    """
+
+    def __init__(self, config: ControlConfig, shape: VehicleShape) -> None:
+        self._config = config
+        self._wheelbase = shape.wheelbase
+        self._track: _Track | None = None
+        self._integral = 0.0  # [m/s^2]
+
+    def step(self, localization: LocalizationEstimate, trajectory: Trajectory | None) -> ControlCommand:
+        """One cycle.
+
+        Without a trajectory, past the end of its horizon, or when it or the believed pose is not finite:
+        brakes to a stop, wheels straight. At a standing end of a trajectory: stops and holds the brake,
+        never creeps towards it.
+        """
+        now = localization.time
+        if trajectory is None or not math.isfinite(localization.x + localization.y + localization.heading):
+            return self._stop(now)
+        if self._track is None or self._track.source is not trajectory:
+            self._track = _Track(trajectory)
+        track, age = self._track, now - trajectory.time
+        if age > track.times[-1] or not track.is_finite:
+            return self._stop(now)
+        wanted, station = track.at_time(age)
+        ahead = _along(wanted, localization)  # [m] the ego is past where it should be by now
+        # One Newton step corrects the first guess, which is off where a large error meets a bend.
+        reached = station + ahead
+        reached += _along(track.at_station(reached), localization)
+        return ControlCommand(
+            time=now,
+            acceleration=self._acceleration(localization.speed, wanted[3], -ahead, track, age),
+            steering=self._steering(localization, track, reached),
+        )
+
+    def _stop(self, now: float) -> ControlCommand:
+        self._integral = 0.0
+        return ControlCommand(time=now, acceleration=-self._config.stop_braking, steering=0.0)
+
+    def _steering(self, localization: LocalizationEstimate, track: _Track, station: float) -> float:
+        config, speed = self._config, localization.speed
+        x, y, heading, _, _, _ = track.at_station(station)
+        dx, dy = localization.x - x, localization.y - y
+        offset = math.cos(heading) * dy - math.sin(heading) * dx
+        error = wrapped(localization.heading - heading)
+        distance = max(config.min_settling_distance, speed * config.settling_time)
+        # Regulated to the heading at which offset and heading terms cancel: that one is limited.
+        approach = offset / (math.sqrt(2.0) * distance)
+        approach = min(config.max_approach_angle, max(-config.max_approach_angle, approach))
+        ahead = track.at_station(station + speed * config.steering_preview)
+        curvature = ahead[5] - math.sqrt(2.0) / distance * (error + approach)
+        most = config.max_lateral_acceleration / max(1.0, speed * speed)
+        steering = math.atan(self._wheelbase * min(most, max(-most, curvature)))
+        return min(config.max_steering, max(-config.max_steering, steering))
+
+    def _acceleration(self, speed: float, wanted: float, behind: float, track: _Track, age: float) -> float:
+        config = self._config
+        soon = track.at_time(age + config.standstill_preview)[0]
+        if max(wanted, soon[3]) <= config.standstill_speed:
+            self._integral = 0.0
+            return self._halting(speed, behind)
+        error = wanted - speed
+        position = min(config.max_position_error, max(-config.max_position_error, behind))
+        ahead = track.at_time(age + config.acceleration_preview)[0]
+        direct = ahead[4] + config.speed_gain * error + config.position_gain * position + self._integral
+        limited = min(config.max_acceleration, max(-config.max_braking, direct))
+        # Anti-windup: what the actuator cannot give is not asked for more and more.
+        if limited == direct:
+            change = config.speed_integral_gain * error * config.period
+            self._integral = min(config.max_integral, max(-config.max_integral, self._integral + change))
+        return limited
+
+    def _halting(self, speed: float, remaining: float) -> float:
+        """Comes to rest `remaining` metres ahead, or at once when that point is reached."""
+        config = self._config
+        if speed <= config.standstill_speed:
+            return -config.standstill_braking
+        # Half a lag's way is already gone before the brake answers.
+        room = remaining - 0.5 * config.acceleration_preview * speed
+        needed = 0.5 * speed * speed / room if room > 0.0 else config.stop_braking + config.speed_gain * speed
+        return -min(config.max_braking, needed)
+
+
+def _along(row: Row, localization: LocalizationEstimate) -> float:
+    """How far the pose lies ahead of `row`, along its heading [m]."""
+    return math.cos(row[2]) * (localization.x - row[0]) + math.sin(row[2]) * (localization.y - row[1])

@@ -1,0 +1,154 @@
+"""Idealized substitutes: what localization, perception, prediction and control would put out if they knew the truth.
+
+Planning has none. Frames: a substitute stands exactly where its component stands, so perception and
+prediction place the truth on the map through the localization estimate, and control moves the true ego
+relative to the believed pose. No substitute repairs, or is spoilt by, another component's fault.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from dvca_sumo.geometry.angles import wrapped
+from dvca_sumo.geometry.frames import Pose, relative, rotated, transferred
+from dvca_sumo.geometry.randomness import key_of
+from dvca_sumo.interventions import Occasion
+from dvca_sumo.interventions.targets import believed_pose, true_pose
+from dvca_sumo.messages import (
+    ACCELERATION,
+    CURVATURE,
+    HEADING,
+    PREDICTION_TIMES,
+    SPEED,
+    T,
+    X,
+    Y,
+    Component,
+    ControlCommand,
+    Floats,
+    LocalizationEstimate,
+    Message,
+    PoseStep,
+    PredictedObjects,
+    TrackedObjects,
+    Trajectory,
+)
+
+CONTROL_STEP = 0.01  # [s]
+# A substitute that takes over beside the trajectory closes the gap like a vehicle, not by a jump.
+_CLOSING_SPEED = 0.5  # [m/s]
+_CLOSING_TURN = 0.3  # [rad/s]
+_LOST_BRAKING = 3.0  # [m/s^2] without any trajectory left to follow
+
+
+def ideal_localization(occasion: Occasion) -> LocalizationEstimate:
+    """The true pose, speed, acceleration and yaw rate."""
+    ego = occasion.moment.ego
+    return LocalizationEstimate(ego.time, ego.x, ego.y, ego.heading, ego.speed, ego.acceleration, ego.yaw_rate)
+
+
+def ideal_perception(occasion: Occasion) -> TrackedObjects:
+    """Every object in sensor range with true pose, size, class and velocity, and all signal states.
+
+    Ids are derived from the simulator's, so that an object keeps its id for life.
+    """
+    return _true_objects(occasion)[0]
+
+
+def ideal_prediction(occasion: Occasion) -> PredictedObjects:
+    """Every object in sensor range with the one trajectory that it follows in the recorded run.
+
+    An object that the record does not hold keeps its velocity.
+    """
+    tracked, names = _true_objects(occasion)
+    source, target = true_pose(occasion), believed_pose(occasion)
+    poses = np.empty((len(names), len(PREDICTION_TIMES), 3))
+    lanes: list[tuple[str, ...]] = []
+    for row, name in enumerate(names):
+        known = occasion.futures.of(name, occasion.moment.time)
+        if known is None:
+            poses[row, :, :2] = tracked.boxes[row, :2] + PREDICTION_TIMES[:, None] * tracked.velocities[row]
+            poses[row, :, 2] = tracked.boxes[row, 2]
+            lanes.append(())
+        else:
+            poses[row] = transferred(known[0], source, target)
+            lanes.append(known[1])
+    count = len(names)
+    return PredictedObjects(tracked, np.arange(count), np.ones(count), poses, tuple(lanes))
+
+
+def ideal_control(occasion: Occasion) -> ControlCommand:
+    """The ego moves exactly as the current trajectory says (Apollo's sim-control).
+
+    The planned motion over the next control step is applied in the ego's own frame; what the ego is
+    beside the trajectory, by its own belief, is closed at a limited speed.
+    """
+    time = occasion.moment.time
+    speed = occasion.moment.ego.speed
+    trajectory = occasion.trajectory
+    if trajectory is None or time + CONTROL_STEP > trajectory.time + trajectory.points[-1, T]:
+        slower = max(0.0, speed - _LOST_BRAKING * CONTROL_STEP)
+        step = PoseStep(0.5 * (speed + slower) * CONTROL_STEP, 0.0, 0.0, slower, (slower - speed) / CONTROL_STEP, 0.0)
+        return ControlCommand(time, step.acceleration, 0.0, step)
+    here = _row_at(trajectory, time)
+    there = _row_at(trajectory, time + CONTROL_STEP)
+    gap = relative(_pose(here), believed_pose(occasion))
+    motion = relative(_pose(there), _pose(here))
+    nearer, turned = _CLOSING_SPEED * CONTROL_STEP, _CLOSING_TURN * CONTROL_STEP
+    step = PoseStep(
+        forward=motion[0] + _clipped(gap[0], nearer),
+        left=motion[1] + _clipped(gap[1], nearer),
+        turn=wrapped(motion[2]) + _clipped(wrapped(gap[2]), turned),
+        speed=float(there[SPEED]),
+        acceleration=float(there[ACCELERATION]),
+        curvature=float(there[CURVATURE]),
+    )
+    return ControlCommand(time, step.acceleration, 0.0, step)
+
+
+SUBSTITUTES: dict[Component, Callable[[Occasion], Message]] = {
+    Component.LOCALIZATION: ideal_localization,
+    Component.PERCEPTION: ideal_perception,
+    Component.PREDICTION: ideal_prediction,
+    Component.CONTROL: ideal_control,
+}
+
+
+def _true_objects(occasion: Occasion) -> tuple[TrackedObjects, tuple[str, ...]]:
+    moment = occasion.moment
+    objects = moment.objects
+    gaps = np.hypot(objects.boxes[:, 0] - moment.ego.x, objects.boxes[:, 1] - moment.ego.y)
+    rows = np.flatnonzero(gaps < occasion.sensor_range)
+    source, target = true_pose(occasion), believed_pose(occasion)
+    boxes = objects.boxes[rows].copy()
+    boxes[:, :3] = transferred(boxes[:, :3], source, target)
+    names = tuple(objects.ids[row] for row in rows)
+    tracked = TrackedObjects(
+        moment.time,
+        np.array([key_of(name) for name in names], dtype=np.int64),
+        objects.classes[rows],
+        boxes,
+        rotated(objects.velocities[rows], target[2] - source[2]),
+        dict(moment.signals),
+    )
+    return tracked, names
+
+
+def _row_at(trajectory: Trajectory, time: float) -> Floats:
+    points = trajectory.points
+    place = (time - trajectory.time) / (points[1, T] - points[0, T])
+    row = min(max(int(place), 0), len(points) - 2)
+    share = place - row
+    between: Floats = points[row] + share * (points[row + 1] - points[row])
+    turn = wrapped(float(points[row + 1, HEADING] - points[row, HEADING]))
+    between[HEADING] = points[row, HEADING] + share * turn
+    return between
+
+
+def _pose(row: Floats) -> Pose:
+    return (float(row[X]), float(row[Y]), float(row[HEADING]))
+
+
+def _clipped(value: float, most: float) -> float:
+    return math.copysign(min(abs(value), most), value)

@@ -1,0 +1,206 @@
+"""Which lanes moving objects follow: found by distance and heading, then kept from cycle to cycle.
+
+An object is anchored to a lane off the junctions and seen from every continuation of it. Thus lanes that
+overlap on a junction compete by how well they fit, and no object hops between them.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.geometry.angles import wrapped, wrapped_all
+from dvca_sumo.messages import Floats, Integers
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.stack.lane_paths import LanePath, LanePaths, Placements
+
+
+class LaneMatchConfig(msgspec.Struct, frozen=True):
+    """When an object counts as following a lane."""
+
+    search_radius: float = 4.0  # [m] around the object's centre
+    margin: float = 0.3  # [m] the centre may lie this far outside the lane
+    max_heading_error: float = 0.8  # [rad]
+    heading_weight: float = 3.0  # [m/rad] heading error against distance, when lanes compete
+    undrivable_penalty: float = 1.5  # [m] lanes that are not for motor traffic, when lanes compete
+    offset_sigma: float = 0.7  # [m] fit of continuations that part on a junction
+    heading_sigma: float = 0.2  # [rad]
+    min_share: float = 0.03  # less likely continuations are dropped
+    retry_distance: float = 1.0  # [m] an object on no lane is looked at again after moving this far
+
+
+class Candidates(NamedTuple):
+    """Objects on lanes, one row for each continuation, by ascending object row."""
+
+    owners: Integers  # (h,) object rows
+    paths: list[LanePath]  # (h,)
+    probabilities: Floats  # (h,) sum to 1 for each object
+    placements: Placements  # (h,)
+
+    def chosen(self, rows: Integers) -> "Candidates":
+        """Only `rows`, in that order."""
+        placements = Placements(*(column[rows] for column in self.placements))
+        return Candidates(self.owners[rows], [self.paths[i] for i in rows], self.probabilities[rows], placements)
+
+
+class Movers(NamedTuple):
+    """Moving objects to be found on lanes."""
+
+    rows: Integers  # (n,) object rows, ascending
+    tracks: list[int]  # (n,)
+    points: Floats  # (n, 2)
+    headings: Floats  # (n,) [rad] directions of motion
+    moved: Floats  # (n,) [m] since they were last seen
+    reaches: Floats  # (n,) [m] how far they may get
+
+    def again(self, chosen: list[int]) -> "Movers":
+        """Only those at positions `chosen`, not moved since."""
+        tracks = [self.tracks[i] for i in chosen]
+        return Movers(
+            self.rows[chosen],
+            tracks,
+            self.points[chosen],
+            self.headings[chosen],
+            np.zeros(len(chosen)),
+            self.reaches[chosen],
+        )
+
+
+class _Anchor:
+    """What is remembered of one object; `lane` is None off the road."""
+
+    __slots__ = ("lane", "station", "x", "y")
+
+    def __init__(self) -> None:
+        self.lane: str | None = None
+        self.station = 0.0  # [m] from the start of `lane`, may lie beyond its end on a junction
+        self.x = self.y = math.inf  # [m] where lanes were last looked for
+
+
+class LaneFollowing:
+    """Remembers each object's lane by its track number; forgets objects that are gone."""
+
+    def __init__(self, config: LaneMatchConfig, roadmap: RoadMap, paths: LanePaths) -> None:
+        self._config = config
+        self._roadmap = roadmap
+        self._lanes = roadmap.lanes
+        self._paths = paths
+        self._anchors: dict[int, _Anchor] = {}
+
+    def lanes_of(self, track: int) -> tuple[str, ...]:
+        """The lane the object was last anchored to, alone; empty off the road."""
+        anchor = self._anchors.get(track)
+        return () if anchor is None or anchor.lane is None else (anchor.lane,)
+
+    def forget_all_but(self, tracks: Iterable[int]) -> None:
+        """Drops what is remembered of objects that are not in `tracks`."""
+        self._anchors = {track: self._anchors[track] for track in tracks if track in self._anchors}
+
+    def find(self, tracks: Sequence[int], points: Floats, headings: Floats) -> None:
+        """Looks for the lanes of the objects that have none: (n,), (n, 2), (n,)."""
+        wanted = []
+        for row, (track, (x, y)) in enumerate(zip(tracks, points.tolist(), strict=True)):
+            anchor = self._anchors.get(track)
+            if anchor is None:
+                anchor = self._anchors[track] = _Anchor()
+            if anchor.lane is None and math.hypot(x - anchor.x, y - anchor.y) >= self._config.retry_distance:
+                anchor.x, anchor.y = x, y
+                wanted.append(row)
+        if not wanted:
+            return
+        near = self._roadmap.lanes_near(points[wanted], self._config.search_radius)
+        for row, lanes in zip(wanted, near, strict=True):
+            self._anchor(self._anchors[tracks[row]], lanes, points[row], float(headings[row]))
+
+    def follow(self, movers: Movers) -> Candidates:
+        """Every continuation of the lanes that `movers` are on. One that left its lanes is anchored anew."""
+        found, lost = self._followed(movers)
+        if not lost:
+            return found
+        for i in lost:
+            self._anchors[movers.tracks[i]] = _Anchor()
+        again = movers.again(lost)
+        self.find(again.tracks, again.points, again.headings)
+        more, _ = self._followed(again)
+        return joined(found, more)
+
+    def _followed(self, movers: Movers) -> tuple[Candidates, list[int]]:
+        """The candidates of movers that fit their lanes, and the positions of those that do not."""
+        owners, paths, priors, guesses = [], [], [], []
+        moved, reaches = movers.moved.tolist(), movers.reaches.tolist()
+        for i, (track, step, reach) in enumerate(zip(movers.tracks, moved, reaches, strict=True)):
+            anchor = self._anchors[track]
+            if anchor.lane is None:
+                continue
+            anchor.station += step
+            for path, probability in self._paths.branches(anchor.lane, anchor.station + reach):
+                owners.append(i)
+                paths.append(path)
+                priors.append(probability)
+                guesses.append(anchor.station)
+        objects = np.array(owners, dtype=np.int64)
+        places = self._paths.project(paths, np.array(guesses), movers.points[objects])
+        config = self._config
+        errors = wrapped_all(movers.headings[objects] - places.headings)
+        fits = (
+            (np.abs(places.offsets) <= places.half_widths + config.margin)
+            & (np.abs(errors) <= config.max_heading_error)
+            & (places.beyond == 0.0)
+        )
+        misfit = (places.offsets / config.offset_sigma) ** 2 + (errors / config.heading_sigma) ** 2
+        candidates = Candidates(objects, paths, np.array(priors) * fits, places)
+        shared = self._shared(candidates, misfit, len(movers.tracks))
+        lost = sorted(set(owners).difference(shared.owners.tolist()))
+        self._advance(shared, movers.tracks)
+        return shared._replace(owners=movers.rows[shared.owners]), lost
+
+    def _shared(self, candidates: Candidates, misfit: Floats, count: int) -> Candidates:
+        """Priors times Gaussian likelihood, as probabilities; what does not fit or is unlikely is dropped."""
+        owners, priors = candidates.owners, candidates.probabilities
+        best = np.full(count, np.inf)
+        np.minimum.at(best, owners, np.where(priors > 0.0, misfit, np.inf))
+        with np.errstate(invalid="ignore"):
+            weights = np.where(priors > 0.0, priors * np.exp(-0.5 * (misfit - best[owners])), 0.0)
+        weights /= np.maximum(np.bincount(owners, weights, count), 1e-12)[owners]
+        weights[weights < self._config.min_share] = 0.0
+        weights /= np.maximum(np.bincount(owners, weights, count), 1e-12)[owners]
+        return candidates._replace(probabilities=weights).chosen(np.flatnonzero(weights))
+
+    def _advance(self, candidates: Candidates, tracks: Sequence[int]) -> None:
+        """Moves anchors on to where the likeliest continuation has the object; past junctions to the next lane."""
+        order = np.lexsort((-candidates.probabilities, candidates.owners))
+        stations = candidates.placements.stations.tolist()
+        seen = -1
+        for row, owner in zip(order.tolist(), candidates.owners[order].tolist(), strict=True):
+            if owner == seen:
+                continue
+            seen = owner
+            anchor, path, station = self._anchors[tracks[owner]], candidates.paths[row], stations[row]
+            which = path.lane_at(station)
+            if which and not self._lanes[path.lanes[which]].is_internal:
+                anchor.lane, anchor.station = path.lanes[which], station - path.starts[which]
+            else:
+                anchor.station = station
+
+    def _anchor(self, anchor: _Anchor, lanes: Sequence[str], point: Floats, heading: float) -> None:
+        """Anchors to the best of `lanes` that the object fits, if any."""
+        config, lowest = self._config, math.inf
+        for name in lanes:
+            lane = self._lanes[name]
+            stations, offsets = lane.line.project(point)
+            station, offset = float(stations[0]), abs(float(offsets[0]))
+            error = abs(wrapped(heading - float(np.interp(station, lane.line.stations, lane.line.headings))))
+            cost = offset + config.heading_weight * error + (0.0 if lane.is_drivable else config.undrivable_penalty)
+            if offset <= lane.width / 2.0 + config.margin and error <= config.max_heading_error and cost < lowest:
+                lowest, anchor.lane, anchor.station = cost, name, station
+
+
+def joined(one: Candidates, other: Candidates) -> Candidates:
+    """Both, by ascending object row."""
+    owners = np.concatenate([one.owners, other.owners])
+    placements = Placements(*map(np.concatenate, zip(one.placements, other.placements, strict=True)))
+    probabilities = np.concatenate([one.probabilities, other.probabilities])
+    everything = Candidates(owners, [*one.paths, *other.paths], probabilities, placements)
+    return everything.chosen(np.argsort(owners, kind="stable"))

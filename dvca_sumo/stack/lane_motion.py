@@ -1,0 +1,81 @@
+"""How an object moves along a lane path: distance over time, and its way back to the lane's centre."""
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.messages import PREDICTION_TIMES, Floats
+from dvca_sumo.stack.lane_paths import LanePath, LanePaths
+
+_HORIZON = float(PREDICTION_TIMES[-1])
+_CRAWL = 0.05  # [m/s] slower is standing still, within a prediction's horizon
+_LATE = 100.0  # [s] later than any prediction time
+
+
+class MotionModelConfig(msgspec.Struct, frozen=True):
+    """How traffic is taken to drive."""
+
+    trend_duration: float = 2.0  # [s] acceleration or braking seen now goes on for so long
+    speeding: float = 1.1  # traffic drives up to so many times the limit, or as it does now where that is more
+    bend_acceleration: float = 3.0  # [m/s^2] lateral, in bends
+    braking: float = 2.5  # [m/s^2] for bends and lower limits
+    settling_time: float = 3.0  # [s] to the lane's centre
+    max_slant: float = 0.3  # [rad] against the lane on the way there: slow objects take longer
+    max_lateral_speed: float = 1.5  # [m/s] a higher one is not believed
+
+
+class LaneMotion:
+    """The motion model on a table of lane paths."""
+
+    def __init__(self, config: MotionModelConfig, paths: LanePaths) -> None:
+        self._config = config
+        self._paths = paths
+
+    def reach(self, speeds: Floats, trends: Floats) -> Floats:
+        """No object gets farther than this within the horizon [m]."""
+        return np.maximum(speeds, speeds + trends * self._config.trend_duration) * _HORIZON + 10.0
+
+    def travelled(self, paths: list[LanePath], stations: Floats, speeds: Floats, trends: Floats) -> Floats:
+        """Stations at PREDICTION_TIMES (h, t) of objects at `stations` (h,), `trends` being accelerations (h,).
+
+        Speed over distance s is v^2 = v0^2 + 2 a s until the trend has run its course, capped by bends and limits;
+        distance over time follows by integrating ds / v, metre by metre.
+        """
+        config = self._config
+        count = int(self.reach(speeds, trends).max()) + 2
+        bends, limits = self._paths.caps(paths, stations, count)
+        metres = np.arange(count, dtype=np.float64)
+        squares = (speeds * speeds)[:, None]
+        final = np.maximum(speeds + trends * config.trend_duration, 0.0)
+        lowest, highest = np.minimum(speeds, final)[:, None], np.maximum(speeds, final)[:, None]
+        free = np.sqrt(np.maximum(squares + 2.0 * trends[:, None] * metres, 0.0))
+        free = np.minimum(np.maximum(free, lowest), highest)
+        slowing = np.sqrt(np.maximum(squares - 2.0 * config.braking * metres, 0.0))
+        pace = np.maximum(config.speeding, speeds / limits[:, 0])[:, None]
+        profile = np.minimum(free, np.maximum(np.minimum(bends, pace * limits), slowing))
+        profile = np.maximum(profile, _CRAWL)
+        times = np.zeros_like(profile)
+        np.cumsum(2.0 / (profile[:, 1:] + profile[:, :-1]), axis=1, out=times[:, 1:])
+        # All rows in one interpolation: each is moved to a stretch of the time axis of its own.
+        apart = 2.0 * _LATE * np.arange(len(paths))[:, None]
+        wanted = (PREDICTION_TIMES + apart).ravel()
+        known = (np.minimum(times, _LATE) + apart).ravel()
+        distances = np.interp(wanted, known, np.tile(metres, len(paths)))
+        return stations[:, None] + distances.reshape(len(paths), -1)
+
+    def settled(
+        self, offsets: Floats, targets: Floats, lateral_speeds: Floats, speeds: Floats
+    ) -> tuple[Floats, Floats]:
+        """Offsets at PREDICTION_TIMES (h, t) on the way to `targets` (h,), and slants against the path [rad] (h, t).
+
+        A cubic that starts with the lateral speed seen and ends level after the settling time.
+        """
+        config = self._config
+        ways = offsets - targets
+        durations = np.maximum(config.settling_time, np.abs(ways) / (config.max_slant * np.maximum(speeds, 0.1)))
+        rates = np.clip(lateral_speeds, -config.max_lateral_speed, config.max_lateral_speed)[:, None]
+        ways, durations = ways[:, None], durations[:, None]
+        share = np.minimum(PREDICTION_TIMES / durations, 1.0)
+        left = 1.0 - share
+        moved = targets[:, None] + left * left * (ways * (1.0 + 2.0 * share) + rates * durations * share)
+        change = left * (rates * (1.0 - 3.0 * share) - 6.0 * ways * share / durations)
+        return moved, np.arctan2(change, np.maximum(speeds, 1.0)[:, None])

@@ -1,0 +1,202 @@
+"""Where lanes lead: their continuations through junctions, as one table of points 1 m apart.
+
+Hypotheses of all objects are projected, timed and placed together. That takes one array that holds
+every path: equal spacing makes a station an index, so no path is searched. Paths are made when first
+asked for and kept, since traffic uses the same ones again and again.
+"""
+
+import heapq
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.geometry.angles import wrapped
+from dvca_sumo.geometry.polyline import Polyline
+from dvca_sumo.messages import Floats, Integers
+from dvca_sumo.roadmap import RoadMap
+
+# Columns of the table.
+_X, _Y, _HEADING, _BEND_SPEED, _LIMIT, _HALF_WIDTH = range(6)
+
+_TAIL = 300  # [m] beyond a dead end or the net's edge, traffic is taken to go straight on
+_LENGTH_STEP = 40.0  # [m] continuations are kept by length in such steps
+_STRAIGHT = 0.35  # [rad] less turning than this goes straight on
+_STRAIGHT_WEIGHT = 3.0  # going straight against turning
+_TURNAROUND = 2.6  # [rad]
+_TURNAROUND_WEIGHT = 0.1
+_BEND = 2  # rows (metres) to either side over which curvature is taken
+_WINDOW = np.arange(-8, 9)  # rows (metres) around a guessed station that a projection searches
+
+
+class LanePath(msgspec.Struct, frozen=True, eq=False):
+    """Lanes in driving order, as rows `first` ... `first + count - 1` of the table."""
+
+    lanes: tuple[str, ...]
+    starts: tuple[float, ...]  # [m] station at which each lane begins
+    first: int
+    count: int
+
+    def lane_at(self, station: float) -> int:
+        """Index in `lanes` of the lane at `station` [m]."""
+        return max(0, bisect_right(self.starts, station) - 1)
+
+    def lanes_between(self, start: float, end: float) -> tuple[str, ...]:
+        """The lanes from station `start` to station `end` [m]."""
+        return self.lanes[self.lane_at(start) : self.lane_at(end) + 1]
+
+
+class Placements(NamedTuple):
+    """Points seen from paths, one row each."""
+
+    stations: Floats  # (h,) [m]
+    offsets: Floats  # (h,) [m] to the left
+    headings: Floats  # (h,) [rad] of the path there
+    half_widths: Floats  # (h,) [m] of the lane there
+    beyond: Floats  # (h,) [m] how far outside the searched stretch the point lies, 0 within
+
+
+class LanePaths:
+    """All lane paths asked for so far; deterministic, whatever the order of asking."""
+
+    def __init__(self, roadmap: RoadMap, *, max_branches: int, lateral_acceleration: float, braking: float) -> None:
+        """Bends are driven at `lateral_acceleration` and approached braking with `braking` [m/s^2]."""
+        self._lanes = roadmap.lanes
+        self._max_branches = max_branches
+        self._lateral_acceleration = lateral_acceleration
+        self._braking = braking
+        self._rows = np.empty((4096, 6))
+        self._used = 0
+        self._paths: dict[tuple[str, ...], LanePath] = {}
+        self._branches: dict[tuple[str, int], tuple[tuple[LanePath, float], ...]] = {}
+
+    def branches(self, lane: str, length: float) -> tuple[tuple[LanePath, float], ...]:
+        """The likeliest continuations that reach `length` [m] from the start of `lane`; probabilities sum to 1."""
+        key = (lane, math.ceil(length / _LENGTH_STEP))
+        found = self._branches.get(key)
+        if found is None:
+            likely = self._continuations(lane, key[1] * _LENGTH_STEP)
+            total = sum(probability for probability, _ in likely)
+            found = tuple((self._path(lanes), probability / total) for probability, lanes in likely)
+            self._branches[key] = found
+        return found
+
+    def project(self, paths: Sequence[LanePath], guesses: Floats, points: Floats) -> Placements:
+        """Places `points` (h, 2) on their paths, searched around the stations guessed (h,)."""
+        first, last = _extents(paths)
+        rows = np.minimum(np.maximum(np.rint(guesses).astype(np.int64)[:, None] + _WINDOW, 0), last[:, None])
+        near = self._rows.take(rows + first[:, None], axis=0)[:, :, :_HEADING]
+        gaps = points[:, None, :] - near
+        nearest = np.einsum("hwc,hwc->hw", gaps, gaps).argmin(axis=1)
+        every = np.arange(len(rows))
+        gap, row = gaps[every, nearest], rows[every, nearest]
+        found = self._rows[row + first]
+        headings = found[:, _HEADING]
+        cosines, sines = np.cos(headings), np.sin(headings)
+        along = gap[:, 0] * cosines + gap[:, 1] * sines
+        offsets = gap[:, 1] * cosines - gap[:, 0] * sines
+        # Rows are 1 m apart: unless the window missed it, the nearest is about half a metre away along the path.
+        beyond = np.maximum(np.abs(along) - 1.0, 0.0)
+        return Placements(row + along, offsets, headings, found[:, _HALF_WIDTH], beyond)
+
+    def caps(self, paths: Sequence[LanePath], stations: Floats, count: int) -> tuple[Floats, Floats]:
+        """Speeds for bends, and speed limits, at `stations` (h,) and each of `count` metres on: (h, count) each."""
+        first, last = _extents(paths)
+        rows = np.maximum(np.rint(stations).astype(np.int64), 0)[:, None] + np.arange(count)
+        found = self._rows.take(np.minimum(rows, last[:, None]) + first[:, None], axis=0)
+        return found[:, :, _BEND_SPEED], found[:, :, _LIMIT]
+
+    def poses(self, paths: Sequence[LanePath], stations: Floats, offsets: Floats) -> Floats:
+        """Poses at `stations` (h, t), moved to the left by `offsets` (h, t): (h, t, 3), headings not wrapped."""
+        first, last = _extents(paths)
+        rows = np.minimum(np.maximum(stations.astype(np.int64), 0), last[:, None] - 1)
+        shares = (stations - rows)[:, :, None]
+        rows += first[:, None]
+        before = self._rows.take(rows, axis=0)[:, :, : _HEADING + 1]
+        poses: Floats = before + shares * (self._rows.take(rows + 1, axis=0)[:, :, : _HEADING + 1] - before)
+        poses[:, :, _X] -= offsets * np.sin(poses[:, :, _HEADING])
+        poses[:, :, _Y] += offsets * np.cos(poses[:, :, _HEADING])
+        return poses
+
+    def _continuations(self, lane: str, length: float) -> list[tuple[float, tuple[str, ...]]]:
+        """Best-first search: the first ones to reach `length` are the likeliest."""
+        lanes = self._lanes
+        likely: list[tuple[float, tuple[str, ...]]] = []
+        open_ends: list[tuple[float, tuple[str, ...], float]] = [(-1.0, (lane,), lanes[lane].line.length)]
+        while open_ends and len(likely) < self._max_branches:
+            probability, followed, covered = heapq.heappop(open_ends)
+            weights = self._weights(followed[-1]) if covered < length else {}
+            if not weights:
+                likely.append((-probability, followed))
+            total = sum(weights.values())
+            for successor, weight in weights.items():
+                further = covered + lanes[successor].line.length
+                heapq.heappush(open_ends, (probability * weight / total, (*followed, successor), further))
+        return likely
+
+    def _weights(self, lane: str) -> dict[str, float]:
+        """How likely each successor is, against the others. Off the ego's kind of lane, all ways are open."""
+        lanes = self._lanes
+        drivable = [name for name in lanes[lane].successors if lanes[name].is_drivable]
+        followed = drivable if drivable and lanes[lane].is_drivable else lanes[lane].successors
+        weights = {}
+        for name in followed:
+            headings = lanes[name].line.headings
+            turn = abs(wrapped(float(headings[-1 if lanes[name].is_internal else 0] - lanes[lane].line.headings[-1])))
+            weight = _STRAIGHT_WEIGHT if turn < _STRAIGHT else 1.0
+            weights[name] = weight if turn < _TURNAROUND else _TURNAROUND_WEIGHT
+        return weights
+
+    def _path(self, lanes: tuple[str, ...]) -> LanePath:
+        found = self._paths.get(lanes)
+        if found is None:
+            found = self._added(lanes)
+            self._paths[lanes] = found
+        return found
+
+    def _added(self, lanes: tuple[str, ...]) -> LanePath:
+        parts = [self._lanes[name] for name in lanes]
+        points = np.concatenate([part.line.points for part in parts])
+        line = Polyline(points)
+        passed = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+        begins = np.cumsum([0, *(len(part.line.points) for part in parts[:-1])])
+        starts = passed[begins]
+        stations = np.arange(int(line.length) + 1 + (0 if parts[-1].successors else _TAIL), dtype=np.float64)
+        which = np.searchsorted(starts, stations, side="right") - 1
+        poses = line.poses(stations)
+        rows = np.column_stack(
+            [
+                poses,
+                self._bend_speeds(poses[:, _HEADING]),
+                np.array([part.speed_limit for part in parts])[which],
+                np.array([part.width / 2.0 for part in parts])[which],
+            ]
+        )
+        return LanePath(lanes, tuple(starts.tolist()), self._stored(rows), len(rows))
+
+    def _bend_speeds(self, headings: Floats) -> Floats:
+        """The speed at each row that leaves time to brake for the bends ahead [m/s]."""
+        if len(headings) <= 2 * _BEND:
+            return np.full(len(headings), np.inf)
+        turns = np.abs(headings[2 * _BEND :] - headings[: -2 * _BEND]) / (2.0 * _BEND)
+        squares = self._lateral_acceleration / np.maximum(np.pad(turns, _BEND, mode="edge"), 1e-6)
+        # v(s)^2 <= v(s')^2 + 2 b (s' - s) for every s' ahead: a running minimum from behind.
+        braking = 2.0 * self._braking * np.arange(len(headings))
+        speeds: Floats = np.sqrt(np.minimum.accumulate((squares + braking)[::-1])[::-1] - braking)
+        return speeds
+
+    def _stored(self, rows: Floats) -> int:
+        first, self._used = self._used, self._used + len(rows)
+        if self._used > len(self._rows):
+            self._rows = np.concatenate([self._rows[:first], np.empty((2 * self._used - first, 6))])
+        self._rows[first : self._used] = rows
+        return first
+
+
+def _extents(paths: Sequence[LanePath]) -> tuple[Integers, Integers]:
+    """First row in the table, and last row counted from it (h,), (h,)."""
+    extents = np.array([(path.first, path.count - 1) for path in paths], dtype=np.int64).reshape(-1, 2)
+    return extents[:, 0], extents[:, 1]

@@ -1,0 +1,73 @@
+"""All parameters of planning."""
+
+import msgspec
+
+
+class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the ego is to drive; the numbers describe a calm driver and belong to no scenario."""
+
+    # Start: how far the believed pose may be from the previous trajectory for the plan to go on from there.
+    stitch_lateral: float = 0.5  # [m] what control leaves in a curve
+    stitch_longitudinal: float = 1.5  # [m] what actuator lag leaves when the speed changes
+    stitch_heading: float = 0.2  # [rad]
+    stitch_speed: float = 2.5  # [m/s]
+    off_route: float = 8.0  # [m] from the reference line: two lanes; beyond, the map says nothing about the ego
+
+    # Limits of motion.
+    cruise_fraction: float = 0.97  # of the speed limit: room for what control overshoots
+    acceleration: float = 1.8  # [m/s^2] comfort
+    braking: float = 1.2  # [m/s^2] b of the intelligent driver model: stops then take about twice that
+    slowing: float = 1.5  # [m/s^2] before curves and lower limits
+    comfort_braking: float = 2.5  # [m/s^2] not exceeded unless there is no other way
+    hard_braking: float = 7.5  # [m/s^2] what dry asphalt allows with something in reserve
+    jerk: float = 4.0  # [m/s^3] comfort
+    hard_jerk: float = 20.0  # [m/s^3] when braking harder than comfort
+    lateral_acceleration: float = 2.0  # [m/s^2] in curves
+    shift_acceleration: float = 1.2  # [m/s^2] when moving sideways
+    curvature: float = 0.15  # [1/m] of a sideways move at low speed: within the steering of a car
+
+    # Distances kept lengthwise, from the front bumper.
+    stop_line_gap: float = 0.8  # [m] before a stop line
+    object_gap: float = 5.0  # [m] behind what stands: leaves room to pull out later
+    yield_gap: float = 2.0  # [m] before the way of a crossing vehicle
+    person_gap: float = 3.0  # [m] before the way of a crossing person
+    follow_gap: float = 4.0  # [m] behind a leader that stops
+    headway: float = 1.5  # [s] behind a moving leader
+
+    # Distances kept sideways, from the side of the body.
+    object_margin: float = 0.3  # [m] closer than this counts as in the way
+    bicycle_margin: float = 0.6  # [m] bicycles sway
+    person_margin: float = 0.5  # [m] of people who stand or walk along the road
+    crossing_person_margin: float = 1.0  # [m] of people who walk across
+    crossing_margin: float = 2.0  # [m] of people who walk across at a pedestrian crossing
+    person_slow_gap: float = 1.5  # [m] slow down when passing people closer than this
+    object_slow_gap: float = 0.8  # [m] slow down when passing standing objects closer than this
+
+    # Nudging: going around what stands, within the lanes of our direction.
+    nudge_clearance: float = 0.7  # [m] wanted sideways
+    nudge_clearance_least: float = 0.4  # [m] accepted where the road is narrow; more than `object_margin`
+    person_clearance: float = 1.2  # [m] wanted beside people
+    edge_clearance: float = 0.2  # [m] to the edge of the road
+    nudge_hold: float = 0.15  # [m] smaller changes of a target are taken for noise
+    standing_speed: float = 0.5  # [m/s] slower than this is standing: above the noise of a tracker
+    parked_after: float = 3.0  # [s] of standing before the ego leaves its lane for a vehicle or person
+    queue_reach: float = 30.0  # [m] before a stop line, a vehicle that stands may be waiting
+    queue_gap: float = 12.0  # [m] to the next vehicle ahead, a vehicle that stands may be waiting
+
+    # Whose turn it is.
+    likely: float = 0.2  # probability from which a hypothesis counts
+    possible: float = 0.05  # probability from which it counts when it happens within `soon`
+    soon: float = 1.5  # [s]
+    pass_margin: float = 1.5  # [s] ahead of someone with priority
+    pass_margin_prior: float = 0.5  # [s] ahead of someone who should have waited but cannot
+    pass_hold: float = 0.5  # [s] less margin is accepted by a decision already taken
+    clear_margin: float = 0.5  # [s] behind someone who has crossed
+    expected_braking: float = 3.0  # [m/s^2] of those who have to give way to the ego
+    give_way_speed: float = 8.0  # [m/s] at a line where others may have priority
+
+    # Signals and signs.
+    yellow_braking: float = 3.0  # [m/s^2] yellow means stop unless it takes more
+    signal_memory: float = 2.0  # [s] a signal out of view keeps its colour
+    unseen_reach: float = 20.0  # [m] beyond braking distance, where a signal should have been seen
+    unseen_patience: float = 5.0  # [s] standing at a signal never seen before it is taken for dark
+    sign_wait: float = 1.0  # [s] standing at a stop sign

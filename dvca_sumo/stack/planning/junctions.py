@@ -1,0 +1,110 @@
+"""Stop lines ahead: who goes first by signal, sign and rule, and where the ego has to stand for it."""
+
+from bisect import bisect_left
+from typing import NamedTuple
+
+from dvca_sumo.messages import SignalColour
+from dvca_sumo.roadmap.route import Control, Route, StopLine
+from dvca_sumo.stack.planning.config import PlanningConfig
+
+_AHEAD = 200.0  # [m] lines further away are not looked at
+_OVERRUN = 0.5  # [m] the front bumper may be past a line and still wait at it
+_STANDING = 0.2  # [m/s]
+_AT_LINE = 4.0  # [m] before the line, where standing counts as having stopped at it
+_ROLLING = 2.0  # [m/s] below this speed the ego always manages to stop at a red light
+_MERGE_REACH = 10.0  # [m] past the junction, where traffic from other approaches still joins
+
+
+class LineView(NamedTuple):
+    """What a stop line asks of the ego now."""
+
+    line: StopLine
+    distance: float  # [m] from the front bumper
+    stop: str | None  # why the ego must not cross it, if it must not
+    gives_way: bool  # whether `line.yields_to` have priority
+
+
+class Junctions:
+    """Reads signals and signs along the route; remembers what was decided at each line until it is passed."""
+
+    def __init__(self, route: Route, config: PlanningConfig) -> None:
+        self._config = config
+        self._lines = route.stop_lines
+        self._exits = [line.exit_station for line in route.stop_lines]
+        self._seen: dict[str, tuple[float, SignalColour]] = {}
+        self._entered: set[int] = set()  # lines crossed on yellow, for which it was too late to stop
+        self._standing: dict[int, float] = {}  # since when the ego stands at a line
+        self._released: set[int] = set()  # lines at which standing was enough
+
+    def step(
+        self, time: float, front: float, rear: float, speed: float, signals: dict[str, SignalColour]
+    ) -> list[LineView]:
+        """The lines of the junctions the ego is in or comes to; `front`, `rear`: route stations of the bumpers."""
+        for signal, colour in signals.items():
+            self._seen[signal] = (time, colour)
+        views = []
+        for index in range(bisect_left(self._exits, rear), len(self._lines)):
+            distance = self._lines[index].station - front
+            if distance > _AHEAD:
+                break
+            if distance < _AT_LINE and speed < _STANDING:
+                self._standing.setdefault(index, time)
+            else:
+                self._standing.pop(index, None)
+            views.append(self._view(index, distance, time, speed))
+        return views
+
+    def _view(self, index: int, distance: float, time: float, speed: float) -> LineView:
+        line = self._lines[index]
+        if line.control is Control.SIGNAL:
+            stop, gives_way = self._at_signal(index, distance, time, speed)
+        else:
+            stop, gives_way = None, True
+            if line.control in (Control.STOP, Control.ALL_WAY_STOP) and not self._stood(
+                index, time, self._config.sign_wait
+            ):
+                stop = f"stop sign {line.lane}"
+        return LineView(line, distance, stop if distance > -_OVERRUN else None, gives_way)
+
+    def _at_signal(self, index: int, distance: float, time: float, speed: float) -> tuple[str | None, bool]:
+        signal = self._lines[index].signal_id or ""
+        colour = self._colour(signal, time)
+        needed = speed * speed / (2.0 * max(distance, 0.1))
+        if colour is SignalColour.YELLOW and needed > self._config.yellow_braking:
+            self._entered.add(index)
+        if colour is SignalColour.RED and speed > _ROLLING:
+            needed = speed * speed / (2.0 * max(distance + _OVERRUN, 0.1))
+            if needed > self._config.hard_braking:
+                self._entered.add(index)
+        if colour in (SignalColour.RED, SignalColour.YELLOW):
+            return (None if index in self._entered else f"stop {colour.value} {signal}"), False
+        if colour is not None:
+            return None, colour is not SignalColour.GREEN
+        reach = speed * speed / (2.0 * self._config.comfort_braking) + self._config.unseen_reach
+        if distance > reach or index in self._entered or self._stood(index, time, self._config.unseen_patience):
+            return None, True
+        return f"stop unseen {signal}", True
+
+    def _colour(self, signal: str, time: float) -> SignalColour | None:
+        seen, colour = self._seen.get(signal, (-1e9, None))
+        return colour if time - seen <= self._config.signal_memory else None
+
+    def _stood(self, index: int, time: float, wait: float) -> bool:
+        """Whether the ego has stood at the line for `wait` seconds, now or earlier."""
+        if time - self._standing.get(index, time) >= wait:
+            self._released.add(index)
+        return index in self._released
+
+
+def has_priority(views: list[LineView], station: float, lanes: tuple[str, ...]) -> bool | None:
+    """Whether traffic on `lanes` has priority over the ego where they meet, at a route station.
+
+    None where the map does not tell: they do not meet on a junction, or not on conflicting lanes.
+    """
+    for line, _, _, gives_way in views:
+        if line.station - 1.0 <= station <= line.exit_station + _MERGE_REACH:
+            if not line.yields_to.isdisjoint(lanes):
+                return gives_way
+            if not line.crosses.isdisjoint(lanes):
+                return False
+    return None

@@ -1,0 +1,181 @@
+"""The path: the reference line moved sideways by minimum-jerk blends, and the room the ego's body needs on it."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from dvca_sumo.messages import Floats, VehicleShape
+from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.reference import BEHIND, Window
+from dvca_sumo.stack.planning.start import StartState
+
+_PEAK = 5.7735  # highest second derivative of a minimum-jerk blend of size 1 over length 1: 10 / sqrt(3)
+_SHORTEST_BLEND = 6.0  # [m]
+_STEEPEST = 0.6  # tangent of the largest angle between path and reference line
+_SHARPEST = 0.25  # [1/m] largest initial second derivative taken over from the start state
+_UNDERWAY = 1.5  # of a move's length: a move begun early, because the ego was faster then, is not taken back
+_FADE = 5.0  # [m] over which what projection left of the start position is blended out
+
+
+class Plateau(NamedTuple):
+    """A stretch of the window on which the rear axle keeps an offset."""
+
+    begin: float  # [m]
+    end: float  # [m]
+    offset: float  # [m] left positive
+
+
+class Lateral(NamedTuple):
+    """Offset from the reference line and its first two derivatives by station."""
+
+    offset: float  # [m]
+    slope: float
+    bend: float  # [1/m]
+
+
+class Path(msgspec.Struct, frozen=True, eq=False):
+    """Geometry of the plan for the rear axle; row i lies at station i of the window."""
+
+    x: Floats  # (n,) [m]
+    y: Floats  # (n,) [m]
+    headings: Floats  # (n,) [rad], continuous
+    curvatures: Floats  # (n,) [1/m]
+    arcs: Floats  # (n,) [m] length of path from row 0
+    left: Floats  # (BEHIND + n,) rows of the window: leftmost offset that the body sweeps at each station [m]
+    right: Floats  # (BEHIND + n,) rightmost [m]
+
+
+def lateral_start(start: StartState, window: Window, offset: float) -> Lateral:
+    """The start state relative to the reference line at the window's origin."""
+    curvature = float(window.curvatures[BEHIND])
+    scale = max(1.0 - curvature * offset, 0.2)
+    angle = math.remainder(start.heading - float(window.headings[BEHIND]), 2.0 * math.pi)
+    tangent = min(max(math.tan(angle), -_STEEPEST), _STEEPEST) if abs(angle) < 1.2 else 0.0
+    cosine = 1.0 / math.hypot(1.0, tangent)
+    bend = (start.curvature * scale / cosine - curvature) * scale / (cosine * cosine)
+    return Lateral(offset, scale * tangent, min(max(bend, -_SHARPEST), _SHARPEST))
+
+
+def blend_length(shift: float, speed: float, config: PlanningConfig) -> float:
+    """How long a sideways move of `shift` [m] has to be for comfort at `speed`, and for the steering [m]."""
+    sharpest = min(config.curvature, config.shift_acceleration / max(speed * speed, 0.1))
+    return max(_SHORTEST_BLEND, math.sqrt(_PEAK * abs(shift) / sharpest))
+
+
+def path_along(
+    window: Window,
+    start: StartState,
+    lateral: Lateral,
+    plateaus: Sequence[Plateau],
+    shape: VehicleShape,
+    config: PlanningConfig,
+) -> Path:
+    """From the start state onto the reference line, or onto the plateaus where there are any."""
+    count = window.rows.shape[1] - BEHIND
+    offsets, slopes, bends = _profile(lateral, plateaus, start.speed, count, config)
+    ahead = slice(BEHIND, None)
+    cosines, sines, curvatures = window.cosines[ahead], window.sines[ahead], window.curvatures[ahead]
+    x = window.x[ahead] - offsets * sines
+    y = window.y[ahead] + offsets * cosines
+    fade = np.exp(np.arange(count) / -_FADE)
+    x += (start.x - x[0]) * fade
+    y += (start.y - y[0]) * fade
+    scale = 1.0 - curvatures * offsets
+    tangents = slopes / scale
+    squared_cosines = 1.0 / (1.0 + tangents * tangents)
+    steps = np.hypot(x[1:] - x[:-1], y[1:] - y[:-1])
+    left, right = _swept(offsets, slopes, curvatures, shape)
+    return Path(
+        x=x,
+        y=y,
+        headings=window.headings[ahead] + np.arctan(tangents),
+        curvatures=(curvatures + bends * squared_cosines / scale) * np.sqrt(squared_cosines) / scale,
+        arcs=np.concatenate(([0.0], np.cumsum(steps))),
+        left=left,
+        right=right,
+    )
+
+
+def _profile(
+    lateral: Lateral, plateaus: Sequence[Plateau], speed: float, count: int, config: PlanningConfig
+) -> tuple[Floats, Floats, Floats]:
+    """Offset, slope and bend at stations 0 ... count-1: holds and blends between them."""
+    offsets, slopes, bends = (np.zeros(count) for _ in range(3))
+    position, state = 0.0, lateral
+    for begin, end, target in _blends(lateral, plateaus, speed, config):
+        first, last = math.ceil(position), min(math.ceil(begin), count)
+        offsets[first:last] = state.offset
+        first, last = math.ceil(begin), min(math.ceil(end), count)
+        if first < last:
+            rows = slice(first, last)
+            along = np.arange(first, last) - begin
+            offsets[rows], slopes[rows], bends[rows] = _blend(state, target, end - begin, along)
+        position, state = end, Lateral(target, 0.0, 0.0)
+    offsets[min(math.ceil(position), count) :] = state.offset
+    return offsets, slopes, bends
+
+
+def _blends(
+    lateral: Lateral, plateaus: Sequence[Plateau], speed: float, config: PlanningConfig
+) -> list[tuple[float, float, float]]:
+    """Begin, end and target of each sideways move, in order.
+
+    A move ends at a fixed place (where its plateau begins), so that planning it again from any point on
+    it gives the same curve. The ego returns to its lane between plateaus where that takes less than the way.
+    """
+    blends: list[tuple[float, float, float]] = []
+    position, offset = 0.0, lateral.offset
+    unsettled = abs(lateral.offset) + 4.0 * abs(lateral.slope)
+    for plateau in plateaus:
+        length = blend_length(max(abs(plateau.offset - offset), unsettled), speed, config)
+        back = blend_length(max(abs(offset), unsettled), speed, config)
+        is_underway = not blends and offset * plateau.offset > 0.0
+        if plateau.begin - (_UNDERWAY * length if is_underway else length) > position + back:
+            blends.append((position, position + back, 0.0))
+            position, offset, unsettled = position + back, 0.0, 0.0
+            length = blend_length(plateau.offset, speed, config)
+        begin = max(position, plateau.begin - length) if blends else position
+        shortest = blend_length(max(abs(plateau.offset - offset), unsettled), 0.0, config)
+        reached = max(plateau.begin, begin + shortest)
+        blends.append((begin, reached, plateau.offset))
+        position, offset, unsettled = max(plateau.end, reached), plateau.offset, 0.0
+    back = blend_length(max(abs(offset), unsettled), speed, config)
+    blends.append((position, position + back, 0.0))
+    return blends
+
+
+def _blend(state: Lateral, target: float, length: float, along: npt.NDArray[np.floating]
+) -> tuple[Floats, Floats, Floats]:
+    """The quintic of least jerk from `state` to rest at `target` after `length`, at distances `along`."""
+    first, second = state.slope * length, 0.5 * state.bend * length * length
+    gap = target - state.offset - first - second
+    slope_gap, bend_gap = -first - 2.0 * second, -2.0 * second
+    third = 10.0 * gap - 4.0 * slope_gap + 0.5 * bend_gap
+    fourth = -15.0 * gap + 7.0 * slope_gap - bend_gap
+    fifth = 6.0 * gap - 3.0 * slope_gap + 0.5 * bend_gap
+    u = along / length
+    offsets = state.offset + u * (first + u * (second + u * (third + u * (fourth + u * fifth))))
+    slopes = (first + u * (2.0 * second + u * (3.0 * third + u * (4.0 * fourth + u * (5.0 * fifth))))) / length
+    bends = (2.0 * second + u * (6.0 * third + u * (12.0 * fourth + u * (20.0 * fifth)))) / (length * length)
+    return offsets, slopes, bends
+
+
+def _swept(offsets: Floats, slopes: Floats, curvatures: Floats, shape: VehicleShape) -> tuple[Floats, Floats]:
+    """Where the sides of the body pass each station: the body is straight and turns about the rear axle."""
+    rows = BEHIND + len(offsets)
+    left, right = np.empty(rows), np.empty(rows)
+    left[:BEHIND] = right[:BEHIND] = offsets[0]
+    left[BEHIND:] = right[BEHIND:] = offsets
+    for ahead in (0.5 * shape.front, shape.front):
+        moved = round(ahead)
+        axis = (offsets + ahead * slopes - (0.5 * ahead * ahead) * curvatures)[:-moved]
+        part = slice(BEHIND + moved, None)
+        np.maximum(left[part], axis, out=left[part])
+        np.minimum(right[part], axis, out=right[part])
+    left += 0.5 * shape.width
+    right -= 0.5 * shape.width
+    return left, right

@@ -1,0 +1,118 @@
+"""Predicted objects in the coordinates of the window: where each may be, and when."""
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, PredictedObjects
+from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.reference import BEHIND, Window
+
+Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+_AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
+
+
+class Extents(msgspec.Struct, frozen=True, eq=False):
+    """Boxes in window coordinates, all arrays of one shape: (n,) or (h, times)."""
+
+    stations: Floats  # [m] of the centres
+    offsets: Floats  # [m] of the centres
+    half_lengths: Floats  # [m] along the reference line
+    half_widths: Floats  # [m] across it
+    directions: Floats  # cosine of the angle between box and reference line
+
+
+class Scene(msgspec.Struct, frozen=True, eq=False):
+    """Objects now, and futures of each: its likely hypotheses, or staying where it is."""
+
+    ids: list[int]  # (n,)
+    classes: Integers  # (n,)
+    speeds: Floats  # (n,) [m/s]
+    is_standing: Flags  # (n,) static, or too slow to tell from it
+    now: Extents  # (n,)
+    times: Floats  # (t,) [s] from the present
+    owners: Integers  # (h,) row of the object
+    probabilities: Floats  # (h,)
+    lanes: list[tuple[str, ...]]  # (h,)
+    futures: Extents  # (h, t)
+    moving: int  # the first `moving` futures move, the others stay where they are
+
+
+def scene_in(window: Window, predicted: PredictedObjects, time: float, config: PlanningConfig) -> Scene:
+    """All objects with their futures at `time` [s] and after.
+
+    A standing object gets the one future of staying: its heading is no intention, and its noise no motion.
+    """
+    objects = predicted.objects
+    speeds = np.hypot(objects.velocities[:, 0], objects.velocities[:, 1])
+    standing = (objects.classes == ObjectClass.STATIC) | (speeds < config.standing_speed)
+    counts = predicted.probabilities >= config.possible
+    counts &= ~standing[predicted.owners]
+    rows = np.flatnonzero(counts)
+    stays = np.ones(len(standing), dtype=np.bool_)
+    stays[predicted.owners[rows]] = False
+    rows = rows[_is_around(window, predicted.poses[rows])]
+    poses = predicted.poses[rows]
+    now, moving = _extents(window, objects.boxes, poses, predicted.owners[rows])
+    still = np.flatnonzero(stays)
+    return Scene(
+        ids=objects.ids.tolist(),
+        classes=objects.classes,
+        speeds=speeds,
+        is_standing=standing,
+        now=now,
+        times=PREDICTION_TIMES - (time - predicted.time),
+        owners=np.concatenate((predicted.owners[rows], still)),
+        probabilities=np.concatenate((predicted.probabilities[rows], np.ones(len(still)))),
+        lanes=[predicted.lanes[row] for row in rows.tolist()] + [()] * len(still),
+        futures=_with_still(moving, now, still),
+        moving=len(rows),
+    )
+
+
+def _is_around(window: Window, poses: Floats) -> Flags:
+    """Hypotheses that come near the window's bounding box at all."""
+    ahead = slice(BEHIND, None)
+    around = np.ones(len(poses), dtype=np.bool_)
+    for axis, line in enumerate((window.x[ahead], window.y[ahead])):
+        values = poses[:, :, axis]
+        around &= (values.max(axis=1) > line.min() - _AROUND) & (values.min(axis=1) < line.max() + _AROUND)
+    return around
+
+
+def _extents(window: Window, boxes: Floats, poses: Floats, owners: Integers) -> tuple[Extents, Extents]:
+    """Of boxes (n, 5) now, and of hypotheses (h, t, 3)."""
+    count = len(boxes)
+    flat = np.concatenate((boxes[:, :3], poses.reshape(-1, 3)))
+    stations, offsets, headings = window.project(flat[:, :2])
+    halves = 0.5 * np.concatenate((boxes[:, 3:], boxes[owners, 3:].repeat(poses.shape[1], axis=0)))
+    turn = flat[:, 2] - headings
+    directions = np.cos(turn)
+    cosines, sines = np.abs(directions), np.sqrt(1.0 - directions * directions)
+    lengths = halves[:, 0] * cosines + halves[:, 1] * sines
+    widths = halves[:, 0] * sines + halves[:, 1] * cosines
+    columns = (stations, offsets, lengths, widths, directions)
+    now = Extents(*(column[:count] for column in columns))
+    return now, Extents(*(column[count:].reshape(poses.shape[:2]) for column in columns))
+
+
+def _with_still(moving: Extents, now: Extents, still: Integers) -> Extents:
+    """The hypotheses, followed by one that stays for each object in `still`."""
+    count, times = moving.stations.shape
+    columns = []
+    for future, present in zip(_columns(moving), _columns(now), strict=True):
+        column = np.empty((count + len(still), times))
+        column[:count] = future
+        column[count:] = present[still, None]
+        columns.append(column)
+    return Extents(*columns)
+
+
+def _columns(extents: Extents) -> tuple[Floats, ...]:
+    return (
+        extents.stations,
+        extents.offsets,
+        extents.half_lengths,
+        extents.half_widths,
+        extents.directions,
+    )

@@ -1,0 +1,162 @@
+"""The speed profile: a driver model rolled out over 8 s under everything that demands to be slower.
+
+Each demand is turned into the highest acceleration it allows, in closed form; the driver takes the lowest,
+within comfort, or beyond comfort where nothing else avoids a collision. Since the model depends on the
+present state only, planning again from any point of a profile gives the rest of it.
+Sources: intelligent driver model (Treiber, Hennecke, Helbing: Congested traffic states, 2000).
+"""
+
+import math
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.messages import TRAJECTORY_TIMES, Floats
+from dvca_sumo.stack.planning.config import PlanningConfig
+
+STEP = 0.2  # [s]
+STEPS = 40
+STEP_TIMES: Floats = np.arange(STEPS + 1, dtype=np.float64) * STEP
+
+_LOOK_AHEAD = 0.7  # [s] the driver steers for the speed allowed where the ego will be then
+_EXPLAINED = 6  # steps in which the demand is looked for that explains the profile
+_NOTICEABLE = 0.3  # [m/s^2] less than without the demand
+_HOLD_SPEED = 0.3  # [m/s] slower than this, the ego does not creep on over the last `_HOLD_GAP`
+_HOLD_GAP = 0.5  # [m]
+_STANDSTILL = 0.02  # [m/s] off the last speeds before standing, so that they reach zero
+_HOLD = -1.0  # [m/s^2]
+_FIRMER = 1.1  # than the constant braking that would just do
+_SAFE_GAP = 2.0  # [m] to a leader, kept by braking beyond comfort if need be
+_TOUCH = 0.1  # [m] smallest distance divided by
+_GENTLE_CLOSING = 2.0  # [m/s^2] of braking to match a leader's speed, up to which comfort is enough
+
+
+class Stop(msgspec.Struct, frozen=True):
+    """Not to get past a place, for ever or up to a moment."""
+
+    at: float  # [m] where the rear axle shall stop, along the path
+    give: float  # [m] further, that hard braking is spent on not getting past
+    label: str
+    until: float = math.inf  # [s]
+
+
+class Leader(msgspec.Struct, frozen=True):
+    """Somebody ahead who moves along the path; lists by step of the profile."""
+
+    rears: list[float]  # [m] where the ego's rear axle would be with its front bumper at the leader
+    speeds: list[float]  # [m/s]
+    label: str
+
+
+class Profile(msgspec.Struct, frozen=True, eq=False):
+    """Motion along the path at STEP_TIMES."""
+
+    arcs: Floats  # [m]
+    speeds: Floats  # [m/s]
+    accelerations: Floats  # [m/s^2], linear in between
+    label: str  # of the demand that shapes the beginning, "" when there is none
+
+    def rows(self) -> tuple[Floats, Floats, Floats]:
+        """Arcs, speeds and accelerations at TRAJECTORY_TIMES; arcs never decrease."""
+        arcs, speeds, accelerations = (np.empty(len(TRAJECTORY_TIMES)) for _ in range(3))
+        arcs[::2], speeds[::2], accelerations[::2] = self.arcs, self.speeds, self.accelerations
+        s, v, a = self.arcs[:-1], self.speeds[:-1], self.accelerations[:-1]
+        half, rise = 0.5 * STEP, 0.5 * (self.accelerations[1:] - a)
+        accelerations[1::2] = a + rise
+        speeds[1::2] = np.maximum(v + half * (a + 0.5 * rise), 0.0)
+        stopping = (v > 0.0) & (self.speeds[1:] == 0.0)
+        speeds[1::2][stopping] = np.maximum(0.5 * v[stopping] - _STANDSTILL, 0.0)
+        arcs[1::2] = np.minimum(np.maximum(s + half * (v + half * (0.5 * a + rise / 6.0)), s), self.arcs[1:])
+        return arcs, speeds, accelerations
+
+
+def slowed_before(caps: Floats, arcs: Floats, braking: float) -> Floats:
+    """The highest speed at each of `arcs` from which all `caps` [m/s] further on are kept at `braking`."""
+    energies = caps * caps + (2.0 * braking) * arcs
+    lowest: Floats = np.minimum.accumulate(energies[::-1])[::-1]
+    return np.sqrt(np.maximum(lowest - (2.0 * braking) * arcs, 0.0))
+
+
+def roll_out(
+    speed: float,
+    acceleration: float,
+    caps: Sequence[float],
+    stops: Sequence[Stop],
+    leader: Leader | None,
+    config: PlanningConfig,
+) -> Profile:
+    """The motion from `speed` and `acceleration`; `caps` [m/s] by metre of path."""
+    s, v, a = 0.0, speed, acceleration
+    arcs, speeds, accelerations = [s], [v], [a]
+    last, label = len(caps) - 1, ""
+    for k in range(STEPS):
+        free = (caps[min(int(s + v * _LOOK_AHEAD), last)] - v) / _LOOK_AHEAD
+        free = min(max(free, -config.comfort_braking), config.acceleration)
+        wanted, because = free, ""
+        for stop in stops:
+            allowed = _for_stop(stop, s, v, k * STEP, config)
+            if allowed < wanted:
+                wanted, because = allowed, stop.label
+        if leader is not None:
+            allowed = _for_leader(leader.rears[k] - s, v, leader.speeds[k], config)
+            if allowed < wanted:
+                wanted, because = allowed, leader.label
+        if not label and k < _EXPLAINED and wanted < free - _NOTICEABLE:
+            label = because
+        s, v, a = _moved(s, v, a, wanted, config)
+        arcs.append(s)
+        speeds.append(v)
+        accelerations.append(a)
+    return Profile(np.array(arcs), np.array(speeds), np.array(accelerations), label)
+
+
+def _for_stop(stop: Stop, s: float, v: float, time: float, config: PlanningConfig) -> float:
+    """The gentler of stopping there and, when the way becomes free, of arriving no earlier than that."""
+    left = stop.until - time
+    if left <= 0.0:
+        return config.acceleration
+    distance = stop.at - s
+    if v < _HOLD_SPEED and distance < _HOLD_GAP:
+        allowed = _HOLD
+    elif distance > _TOUCH:
+        needed = v * v / (2.0 * distance)
+        allowed = max(config.acceleration - needed * needed / config.braking, -_FIRMER * needed)
+    else:
+        allowed = -config.hard_braking
+    firmest = _FIRMER * v * v / (2.0 * max(distance + stop.give, _TOUCH))
+    allowed = max(allowed, -max(config.comfort_braking, firmest))
+    if left < math.inf:
+        allowed = max(allowed, 2.0 * (distance - v * left) / (left * left))
+    return allowed
+
+
+def _for_leader(gap: float, v: float, leader_speed: float, config: PlanningConfig) -> float:
+    """The intelligent driver model; harsher than comfort only where the gap would not last otherwise."""
+    if gap > 200.0:
+        return config.acceleration
+    closing = v - leader_speed
+    if v < _HOLD_SPEED and leader_speed < _HOLD_SPEED and gap < config.follow_gap + _HOLD_GAP:
+        return _HOLD
+    wanted = v * config.headway + 0.5 * v * closing / math.sqrt(config.acceleration * config.braking)
+    ratio = (config.follow_gap + max(wanted, 0.0)) / max(gap, _TOUCH)
+    needed = closing * closing / (2.0 * max(gap - _SAFE_GAP, _TOUCH)) if closing > 0.0 else 0.0
+    firmest = config.comfort_braking if needed < _GENTLE_CLOSING else max(config.comfort_braking, 1.3 * needed)
+    return max(config.acceleration * (1.0 - ratio * ratio), -firmest)
+
+
+def _moved(s: float, v: float, a: float, wanted: float, config: PlanningConfig) -> tuple[float, float, float]:
+    """One step on, with the acceleration moving linearly towards `wanted` within the limits of jerk."""
+    jerk = (
+        config.jerk
+        if wanted > -config.comfort_braking - 1e-9 and a > -config.comfort_braking - 1e-9
+        else (config.hard_jerk)
+    )
+    after = min(max(wanted, a - jerk * STEP, -config.hard_braking), a + jerk * STEP)
+    if v <= 0.0 and after <= 0.0:
+        return s, 0.0, 0.0
+    reached = v + 0.5 * STEP * (a + after)
+    if reached <= 0.0:
+        mean = -0.5 * (a + after)
+        return s + min(v * v / (2.0 * mean), v * STEP), 0.0, 0.0
+    return s + max(STEP * (v + STEP * (2.0 * a + after) / 6.0), 0.0), reached, after

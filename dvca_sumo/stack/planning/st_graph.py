@@ -1,0 +1,112 @@
+"""The ST graph: when each future occupies which part of the path, and what that asks of the ego."""
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, ObjectClass, VehicleShape
+from dvca_sumo.roadmap.route import Crossing
+from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.path import Path
+from dvca_sumo.stack.planning.reference import BEHIND, Window
+from dvca_sumo.stack.planning.scene import Flags, Scene
+from dvca_sumo.stack.planning.speed import STEP_TIMES, Leader
+
+ALONG = 0.5  # cosine of the largest angle (60 degrees) at which someone moves along the path, not across
+
+_WALKS_ACROSS = 0.3  # [m/s] sideways
+_NEVER = 1e4  # [m] for places where there is no leader
+_AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
+_PRESENT = 0.3  # [s] what occupies the path within this time is there already
+
+
+class Graph(msgspec.Struct, frozen=True, eq=False):
+    """Occupation of the path by each future of the scene; places are arcs of the path [m]."""
+
+    occupied: Flags  # (h, t)
+    gaps: Floats  # (h, t) [m] sideways between body and object, negative where they would overlap
+    low: Floats  # (h, t) [m] the object's near end along the path
+    high: Floats  # (h, t) [m] its far end
+    first: list[int]  # (h,) column in which occupation begins; 0 where there is none
+    last: list[int]  # (h,) column in which it ends
+
+
+def graph_of(
+    scene: Scene,
+    window: Window,
+    path: Path,
+    crossings: tuple[Crossing, ...],
+    shape: VehicleShape,
+    config: PlanningConfig,
+) -> Graph:
+    """What comes within its margin of where the ego's body passes, at or ahead of the rear bumper."""
+    futures = scene.futures
+    rows = window.index(futures.stations)
+    gaps = np.maximum(
+        futures.offsets - futures.half_widths - path.left[rows],
+        path.right[rows] - futures.offsets - futures.half_widths,
+    )
+    count = len(path.arcs)
+    stretch = np.zeros(BEHIND + count)
+    stretch[BEHIND:] = path.arcs - np.arange(count)
+    centres = futures.stations + stretch[rows]
+    low, high = centres - futures.half_lengths, centres + futures.half_lengths
+    occupied = gaps < _margins(scene, window, crossings, config)[:, None]
+    occupied &= (high > -shape.rear_overhang) & (futures.stations < count - 2)
+    last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)
+    return Graph(occupied, gaps, low, high, occupied.argmax(axis=1).tolist(), last.tolist())
+
+
+def _margins(scene: Scene, window: Window, crossings: tuple[Crossing, ...], config: PlanningConfig) -> Floats:
+    """(h,) sideways distance within which a future counts as in the way [m]."""
+    classes = scene.classes[scene.owners]
+    margins = np.where(classes == ObjectClass.BICYCLE, config.bicycle_margin, config.object_margin)
+    people = classes == ObjectClass.PEDESTRIAN
+    if not people.any():
+        return margins
+    offsets, stations = scene.futures.offsets, scene.futures.stations[:, 0] + window.station
+    walked = np.abs(offsets[:, 1] - offsets[:, 0])
+    across = people & (walked > _WALKS_ACROSS * (PREDICTION_TIMES[1] - PREDICTION_TIMES[0]))
+    margins[people] = config.person_margin
+    margins[across] = config.crossing_person_margin
+    for crossing in crossings:
+        begin, end = crossing.start_station - _AT_CROSSING, crossing.end_station + _AT_CROSSING
+        margins[across & (stations > begin) & (stations < end)] = config.crossing_margin
+    return margins
+
+
+def leading(graph: Graph, scene: Scene, shape: VehicleShape, config: PlanningConfig) -> tuple[list[int], list[int]]:
+    """Moving futures on the path, as rows of the graph: those that lead (or come towards) the ego, and the rest.
+
+    Left out are unlikely ones that are not about to happen, and who drives behind the ego.
+    """
+    rows = np.flatnonzero(graph.occupied[: scene.moving].any(axis=1))
+    leaders, others = [], []
+    for row in rows.tolist():
+        entry = float(scene.times[graph.first[row]])
+        if scene.probabilities[row] < (config.possible if entry < config.soon else config.likely):
+            continue
+        is_along = abs(scene.futures.directions[row, graph.first[row]]) > ALONG
+        if entry > _PRESENT or not is_along:
+            others.append(row)
+        elif scene.futures.stations[row, 0] > shape.centre:
+            leaders.append(row)
+    return leaders, others
+
+
+def leader_of(rows: list[int], graph: Graph, scene: Scene, shape: VehicleShape) -> Leader | None:
+    """The nearest of the futures `rows` at each moment, while they occupy the path; carried on at constant speed."""
+    if not rows:
+        return None
+    rears = np.where(graph.occupied[rows], graph.low[rows] - shape.front, _NEVER)
+    nearest = rears.argmin(axis=0)
+    columns = np.arange(rears.shape[1])
+    rears = rears[nearest, columns]
+    speeds = np.gradient(graph.low[rows], PREDICTION_TIMES, axis=1)[nearest, columns]
+    beyond = STEP_TIMES[-1] - scene.times[-1]
+    times = np.append(scene.times, STEP_TIMES[-1])
+    track = scene.ids[scene.owners[rows[int(nearest[int(np.argmax(rears < _NEVER))])]]]
+    return Leader(
+        np.interp(STEP_TIMES, times, np.append(rears, rears[-1] + beyond * speeds[-1])).tolist(),
+        np.interp(STEP_TIMES, times, np.append(speeds, speeds[-1])).tolist(),
+        f"follow {track}",
+    )

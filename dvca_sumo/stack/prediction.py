@@ -1,0 +1,167 @@
+"""Prediction: tracked objects -> their possible futures over six seconds.
+
+Vehicles and bicycles follow the lane they are on, through every continuation it has, or change to the
+next lane when they are seen to drift there. Whatever is on no lane, and people, go on as they are.
+"""
+
+import math
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from dvca_sumo.geometry.angles import wrapped_all
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, PredictedObjects, TrackedObjects
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.stack.lane_changes import LaneChangeConfig, LaneChanges, lateral_speeds
+from dvca_sumo.stack.lane_following import Candidates, LaneFollowing, LaneMatchConfig, Movers
+from dvca_sumo.stack.lane_motion import LaneMotion, MotionModelConfig
+from dvca_sumo.stack.lane_paths import LanePaths
+
+# Comparing an array with an enumeration's member costs numpy ten times as much as with a number.
+_VEHICLE, _BICYCLE, _STATIC = int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE), int(ObjectClass.STATIC)
+
+
+class PredictionConfig(msgspec.Struct, frozen=True):
+    """How futures are drawn up."""
+
+    matching: LaneMatchConfig = LaneMatchConfig()
+    changes: LaneChangeConfig = LaneChangeConfig()
+    motion: MotionModelConfig = MotionModelConfig()
+    max_branches: int = 3  # continuations of a lane
+    standing_speed: float = 0.3  # [m/s] slower vehicles stay where they are
+    direction_speed: float = 2.0  # [m/s] faster objects go where their velocity points, slower ones their box
+    trend_smoothing: float = 0.5  # [s] time constant of acceleration estimates
+    max_trend: float = 2.5  # [m/s^2] acceleration that is believed
+    max_braking_trend: float = 4.0  # [m/s^2] braking that is believed, positive number
+
+
+class MapPrediction:
+    """Map-based prediction. Remembers each object's lane and speed by its track number."""
+
+    def __init__(self, config: PredictionConfig, roadmap: RoadMap) -> None:
+        self._config = config
+        self._paths = LanePaths(
+            roadmap,
+            max_branches=config.max_branches,
+            lateral_acceleration=config.motion.bend_acceleration,
+            braking=config.motion.braking,
+        )
+        self._following = LaneFollowing(config.matching, roadmap, self._paths)
+        self._motion = LaneMotion(config.motion, self._paths)
+        self._changes = LaneChanges(config.changes, roadmap, self._paths)
+        self._time = math.nan
+        self._speeds: dict[int, tuple[float, float]] = {}  # by track: [m/s], its trend [m/s^2]
+
+    def step(self, tracked: TrackedObjects) -> PredictedObjects:
+        """One cycle. Every object owns at least one hypothesis; they are ordered by owner.
+
+        The first pose of each hypothesis is where the object is now.
+        """
+        velocities = tracked.velocities
+        speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+        elapsed = tracked.time - self._time if self._speeds else 0.0
+        self._time = tracked.time
+        trends = self._trends(tracked.ids.tolist(), speeds.tolist(), elapsed)
+        reaches = self._motion.reach(speeds, trends)
+        candidates = self._changes.added(self._on_lanes(tracked, speeds, reaches, elapsed), tracked, reaches)
+        candidates, futures, lanes = self._along_lanes(tracked, candidates, speeds, trends)
+        rest = np.flatnonzero(np.bincount(candidates.owners, minlength=len(speeds)) == 0)
+        owners = np.concatenate([candidates.owners, rest])
+        order = np.argsort(owners, kind="stable")
+        poses = np.concatenate([futures, self._straight_on(tracked, rest, speeds)])
+        lanes += [self._following.lanes_of(track) for track in tracked.ids[rest].tolist()]
+        return PredictedObjects(
+            objects=tracked,
+            owners=owners[order],
+            probabilities=np.concatenate([candidates.probabilities, np.ones(len(rest))])[order],
+            poses=poses[order],
+            lanes=tuple(lanes[row] for row in order.tolist()),
+        )
+
+    def _trends(self, tracks: list[int], speeds: list[float], elapsed: float) -> Floats:
+        """Smoothed rates of change of the objects' speeds (n,) [m/s^2]; 0 for new objects."""
+        config, known = self._config, self._speeds
+        gain = min(1.0, elapsed / config.trend_smoothing)
+        self._speeds = {}
+        for track, speed in zip(tracks, speeds, strict=True):
+            before, trend = known.get(track, (speed, 0.0))
+            if elapsed > 0.0:
+                trend += gain * ((speed - before) / elapsed - trend)
+            self._speeds[track] = speed, trend
+        trends = np.array([trend for _, trend in self._speeds.values()])
+        believed: Floats = np.clip(trends, -config.max_braking_trend, config.max_trend)
+        return believed
+
+    def _on_lanes(self, tracked: TrackedObjects, speeds: Floats, reaches: Floats, elapsed: float) -> Candidates:
+        """Moving vehicles and bicycles that follow lanes. Standing ones keep the lane they have."""
+        tracks, points, velocities = tracked.ids.tolist(), tracked.boxes[:, :2], tracked.velocities
+        is_fast = speeds > self._config.direction_speed
+        headings = np.where(is_fast, np.arctan2(velocities[:, 1], velocities[:, 0]), tracked.boxes[:, 2])
+        self._following.forget_all_but(tracks)
+        wheeled = np.flatnonzero(_is_wheeled(tracked))
+        self._following.find([tracks[row] for row in wheeled.tolist()], points[wheeled], headings[wheeled])
+        moving = wheeled[speeds[wheeled] >= self._config.standing_speed]
+        return self._following.follow(
+            Movers(
+                rows=moving,
+                tracks=[tracks[row] for row in moving.tolist()],
+                points=points[moving],
+                headings=headings[moving],
+                moved=speeds[moving] * elapsed,
+                reaches=reaches[moving],
+            )
+        )
+
+    def _along_lanes(
+        self, tracked: TrackedObjects, candidates: Candidates, speeds: Floats, trends: Floats
+    ) -> tuple[Candidates, Floats, list[tuple[str, ...]]]:
+        """The candidates that differ within the horizon, their poses (h, t, 3) and lanes.
+
+        Cars seek the lane's centre, bicycles keep their side of it.
+        """
+        owners, paths, _, places = candidates
+        if not len(owners):
+            return candidates, np.empty((0, len(PREDICTION_TIMES), 3)), []
+        own = speeds[owners]
+        stations = self._motion.travelled(paths, places.stations, own, trends[owners])
+        is_bicycle = tracked.classes[owners] == _BICYCLE
+        keeps_side = is_bicycle & (np.abs(places.offsets) <= places.half_widths)
+        targets = np.where(keeps_side, places.offsets, 0.0)
+        offsets, slants = self._motion.settled(
+            places.offsets, targets, lateral_speeds(candidates, tracked.velocities), own
+        )
+        poses = self._paths.poses(paths, stations, offsets)
+        poses[:, :, 2] = wrapped_all(poses[:, :, 2] + slants)
+        poses[:, 0] = tracked.boxes[owners, :3]
+        ends = zip(paths, stations[:, 0].tolist(), stations[:, -1].tolist(), strict=True)
+        lanes = [path.lanes_between(start, end) for path, start, end in ends]
+        return _told_apart(candidates, poses, lanes)
+
+    def _straight_on(self, tracked: TrackedObjects, rows: Integers, speeds: Floats) -> Floats:
+        """Constant velocity (n, t, 3), which is none for what is static or a standing vehicle."""
+        slow = speeds < self._config.standing_speed
+        stands = (_is_wheeled(tracked) & slow) | (tracked.classes == _STATIC)
+        velocities = np.where(stands[:, None], 0.0, tracked.velocities)[rows]
+        poses = np.repeat(tracked.boxes[rows, None, :3], len(PREDICTION_TIMES), axis=1)
+        poses[:, :, :2] += PREDICTION_TIMES[:, None] * velocities[:, None, :]
+        return poses
+
+
+def _told_apart(
+    candidates: Candidates, poses: Floats, lanes: list[tuple[str, ...]]
+) -> tuple[Candidates, Floats, list[tuple[str, ...]]]:
+    """One of each object's candidates that follow the same lanes: they part beyond the horizon only."""
+    first: dict[tuple[int, tuple[str, ...]], int] = {}
+    same = [first.setdefault(key, row) for row, key in enumerate(zip(candidates.owners.tolist(), lanes, strict=True))]
+    if len(first) == len(lanes):
+        return candidates, poses, lanes
+    kept = np.array(list(first.values()))
+    sums = np.bincount(same, candidates.probabilities)[kept]
+    return candidates.chosen(kept)._replace(probabilities=sums), poses[kept], [lanes[row] for row in kept.tolist()]
+
+
+def _is_wheeled(tracked: TrackedObjects) -> npt.NDArray[np.bool_]:
+    classes = tracked.classes
+    wheeled: npt.NDArray[np.bool_] = (classes == _VEHICLE) | (classes == _BICYCLE)
+    return wheeled

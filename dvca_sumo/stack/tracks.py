@@ -1,0 +1,179 @@
+"""The tracks of a multi-object tracker as one structure of arrays: rows are tracks, ids ascend.
+
+Motion is a Kalman filter with constant velocity and white acceleration noise, all tracks at once;
+heading and size are exponentially smoothed, the class is decided by majority.
+"""
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.geometry.angles import wrapped_all
+from dvca_sumo.messages import Floats, Integers, ObjectClass
+
+Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+
+_CLASSES = len(ObjectClass)
+_LAST_ON_WHEELS = int(ObjectClass.BICYCLE)  # vehicles and bicycles, by class number, move along their heading only
+_STATE = np.eye(4)  # x, y, vx, vy
+
+
+class MotionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How objects are taken to move; tuples are by ObjectClass: vehicle, bicycle, pedestrian, static."""
+
+    accelerations: tuple[float, float, float, float] = (3.0, 1.5, 1.0, 0.1)  # [m/s^2] sigma
+    first_speeds: tuple[float, float, float, float] = (8.0, 4.0, 1.0, 0.1)  # [m/s] sigma before any motion is seen
+    sideways_sigma: float = 0.1  # [m/s] velocity of what rolls across its heading, at rest
+    sideways_share: float = 0.05  # growth of the same with its speed (slip of the centre in curves)
+    moving_speed: float = 0.5  # [m/s] below it the heading is taken to stay as it is
+    heading_gain_moving: float = 0.5  # least weight of a new heading
+    heading_gain_still: float = 0.05  # the same for objects that do not move
+    size_gain: float = 0.05  # least weight of a new size
+
+
+class Measurements(msgspec.Struct, frozen=True):
+    """Detections placed on the map, with what the tracker takes their noise to be."""
+
+    boxes: Floats  # (n, 5)
+    classes: Integers  # (n,)
+    variances: Floats  # (n,) [m^2] of the position, each axis
+    directions: Floats  # (n, 2) unit vectors from the sensor
+    radial_speeds: Floats  # (n,) [m/s]
+    radial_variance: float  # [m^2/s^2]
+
+
+class Tracks:
+    """All tracks, confirmed or not. Arrays are replaced, never written to, so earlier messages may hold them."""
+
+    def __init__(self, config: MotionConfig) -> None:
+        self._config = config
+        self._accelerations = np.array(config.accelerations)
+        self._first_variances = np.array(config.first_speeds) ** 2
+        self._next_id = 1
+        self.ids: Integers = np.zeros(0, dtype=np.int64)
+        self.means: Floats = np.zeros((0, 4))  # x, y, vx, vy
+        self.covariances: Floats = np.zeros((0, 4, 4))
+        self.forms: Floats = np.zeros((0, 3))  # heading, length, width
+        self.votes: Integers = np.zeros((0, _CLASSES), dtype=np.int64)  # hits by class
+        self.sweeps: Integers = np.zeros(0, dtype=np.int64)  # since the first hit, that included
+        self.last_hits: Floats = np.zeros(0)  # [s]
+
+    @property
+    def hits(self) -> Integers:
+        """Detections each track has had, (n,)."""
+        hits: Integers = self.votes.sum(axis=1)
+        return hits
+
+    @property
+    def classes(self) -> Integers:
+        """What most detections of each track said, (n,); a tie goes to the lower class."""
+        classes: Integers = self.votes.argmax(axis=1)
+        return classes
+
+    def predict(self, dt: float) -> None:
+        """Move all tracks on by dt [s]."""
+        transition = np.eye(4)
+        transition[0, 2] = transition[1, 3] = dt
+        noise = np.zeros((4, 4))
+        noise[0, 0] = noise[1, 1] = dt**4 / 4.0
+        noise[0, 2] = noise[2, 0] = noise[1, 3] = noise[3, 1] = dt**3 / 2.0
+        noise[2, 2] = noise[3, 3] = dt**2
+        variances = self._accelerations[self.classes] ** 2
+        self.means = self.means @ transition.T
+        self.covariances = transition @ self.covariances @ transition.T + variances[:, None, None] * noise
+        self.sweeps = self.sweeps + 1
+
+    def update(self, rows: Integers, found: Measurements, time: float) -> None:
+        """Correct track rows[k] by measurement k."""
+        velocities = self.means[rows, 2:]
+        speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+        votes = self.votes.copy()
+        votes[rows, found.classes] += 1
+        last_hits = self.last_hits.copy()
+        last_hits[rows] = time
+        self.votes, self.last_hits = votes, last_hits
+        self._update_forms(rows, found, speeds)
+        self._update_motion(rows, found, speeds)
+
+    def _update_motion(self, rows: Integers, found: Measurements, speeds: Floats) -> None:
+        """Kalman update by position, radial speed and, for what rolls, no velocity across the heading."""
+        count = len(rows)
+        headings = found.boxes[:, 2]
+        rolls = self.classes[rows] <= _LAST_ON_WHEELS
+        observation = np.zeros((count, 4, 4))
+        observation[:, 0, 0] = observation[:, 1, 1] = 1.0
+        observation[:, 2, 2:] = found.directions
+        observation[:, 3, 2] = -np.sin(headings) * rolls
+        observation[:, 3, 3] = np.cos(headings) * rolls
+        measured = np.zeros((count, 4))
+        measured[:, :2] = found.boxes[:, :2]
+        measured[:, 2] = found.radial_speeds
+        noise = np.empty((count, 4))
+        noise[:, 0] = noise[:, 1] = found.variances
+        noise[:, 2] = found.radial_variance
+        noise[:, 3] = (self._config.sideways_sigma + self._config.sideways_share * speeds) ** 2
+
+        means, covariances = self.means[rows], self.covariances[rows]
+        cross = observation @ covariances
+        spread = cross @ observation.transpose(0, 2, 1) + noise[:, :, None] * _STATE
+        gain = np.linalg.solve(spread, cross).transpose(0, 2, 1)
+        residual = measured - (observation @ means[:, :, None])[:, :, 0]
+        new_means, new_covariances = self.means.copy(), self.covariances.copy()
+        new_means[rows] = means + (gain @ residual[:, :, None])[:, :, 0]
+        new_covariances[rows] = covariances - gain @ cross
+        self.means, self.covariances = new_means, new_covariances
+
+    def _update_forms(self, rows: Integers, found: Measurements, speeds: Floats) -> None:
+        """Heading and size: the mean of all that was seen at first, then exponential smoothing."""
+        config = self._config
+        shares = 1.0 / self.hits[rows]
+        floors = np.where(speeds > config.moving_speed, config.heading_gain_moving, config.heading_gain_still)
+        gains = np.empty((len(rows), 3))
+        gains[:, 0] = np.maximum(shares, floors)
+        gains[:, 1:] = np.maximum(shares, config.size_gain)[:, None]
+        change = found.boxes[:, 2:] - self.forms[rows]
+        change[:, 0] = wrapped_all(change[:, 0])
+        forms = self.forms.copy()
+        forms[rows] += gains * change
+        forms[:, 0] = wrapped_all(forms[:, 0])
+        self.forms = forms
+
+    def add(self, found: Measurements, time: float) -> None:
+        """Start a track of each measurement, under ids never used before."""
+        count = len(found.classes)
+        means, covariances = self._first_motion(found)
+        self.ids = np.concatenate([self.ids, np.arange(self._next_id, self._next_id + count)])
+        self._next_id += count
+        self.means = np.concatenate([self.means, means])
+        self.covariances = np.concatenate([self.covariances, covariances])
+        self.forms = np.concatenate([self.forms, found.boxes[:, 2:]])
+        self.votes = np.concatenate([self.votes, np.eye(_CLASSES, dtype=np.int64)[found.classes]])
+        self.sweeps = np.concatenate([self.sweeps, np.ones(count, dtype=np.int64)])
+        self.last_hits = np.concatenate([self.last_hits, np.full(count, time)])
+
+    def _first_motion(self, found: Measurements) -> tuple[Floats, Floats]:
+        """Means and covariances of new tracks: the radial speed conditions a velocity known only by class.
+
+        The prior of what rolls lies along its heading, so its radial speed tells most of its velocity.
+        """
+        priors = self._first_variances[found.classes]
+        along = np.stack([np.cos(found.boxes[:, 2]), np.sin(found.boxes[:, 2])], axis=1)
+        rolls = (found.classes <= _LAST_ON_WHEELS)[:, None, None]
+        sideways = self._config.sideways_sigma**2 * np.eye(2)
+        prior = priors[:, None, None] * np.where(rolls, along[:, :, None] * along[:, None, :], np.eye(2)) + sideways
+        cross = (prior @ found.directions[:, :, None])[:, :, 0]
+        gain = cross / ((cross * found.directions).sum(axis=1) + found.radial_variance)[:, None]
+        means = np.concatenate([found.boxes[:, :2], gain * found.radial_speeds[:, None]], axis=1)
+        covariances = np.zeros((len(means), 4, 4))
+        covariances[:, 0, 0] = covariances[:, 1, 1] = found.variances
+        covariances[:, 2:, 2:] = prior - gain[:, :, None] * cross[:, None, :]
+        return means, covariances
+
+    def keep(self, flags: Flags) -> None:
+        """Drop every track whose flag is not set."""
+        self.ids = self.ids[flags]
+        self.means = self.means[flags]
+        self.covariances = self.covariances[flags]
+        self.forms = self.forms[flags]
+        self.votes = self.votes[flags]
+        self.sweeps = self.sweeps[flags]
+        self.last_hits = self.last_hits[flags]

@@ -1,0 +1,243 @@
+"""One SUMO simulation. Rules of this file:
+
+- It is the only one that imports libsumo; a process holds one simulation at a time.
+- SUMO's conventions (front bumper, degrees clockwise from north) end here: everything returned is in
+  the project's (box centre or rear axle, radians counter-clockwise from +x).
+"""
+
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import libsumo
+import msgspec
+import numpy as np
+import traci.constants as tc
+
+from dvca_sumo.messages import ObjectClass, SignalColour
+from dvca_sumo.scenario import Scenario, ScenarioError, silenced
+from dvca_sumo.truth import EgoTruth, ObjectsTruth
+from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
+
+OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
+NEVER_TELEPORTED = "dvca.ego"  # vehicle type of an adopted ego
+
+_VEHICLE = (tc.VAR_POSITION, tc.VAR_ANGLE, tc.VAR_SPEED, tc.VAR_LANE_ID)
+# Other variables than for vehicles: results of both kinds arrive in one dictionary, by id.
+_PERSON = (tc.VAR_POSITION3D, tc.VAR_ANGLE, tc.VAR_SPEED, tc.VAR_VEHICLE)
+_COLOURS = {
+    "r": SignalColour.RED,
+    "u": SignalColour.RED,
+    "y": SignalColour.YELLOW,
+    "Y": SignalColour.YELLOW,
+    "G": SignalColour.GREEN,
+    "g": SignalColour.PERMISSIVE,
+    "s": SignalColour.PERMISSIVE,
+    "o": SignalColour.OFF,
+    "O": SignalColour.OFF,
+}
+_NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
+_Row = tuple[float, float, float, float, float, float]  # box and speed
+_Body = tuple[str, ObjectClass, _Row, str]  # name, class, row, lane
+_TWO_WHEELED = ("bicycle", "moped", "motorcycle", "scooter")
+
+
+class Entry(msgspec.Struct, frozen=True):
+    """How the ego enters the simulation."""
+
+    ego: str
+    time: float  # [s]
+    front_x: float  # [m]
+    front_y: float  # [m]
+    heading: float  # [rad]
+    speed: float  # [m/s]
+    length: float  # [m]
+    width: float  # [m]
+    vehicle_class: str
+    edges: tuple[str, ...]
+    lane: str
+    position: float  # [m] of the front bumper along the lane
+    parameters: dict[str, str]  # the vehicle's own "dvca." parameters, without that prefix
+
+
+class Session:
+    """A running SUMO simulation; `close` ends it."""
+
+    def __init__(self, scenario: Scenario, folder: Path) -> None:
+        """Start SUMO on `scenario`; copies of silenced inputs go to `folder`.
+
+        Raises:
+            ScenarioError: SUMO refuses the configuration; its own words are on standard error.
+        """
+        if libsumo.isLoaded():
+            raise ScenarioError("a simulation is already loaded in this process")
+        types = folder / "ego.add.xml"
+        types.write_text(f'<additional><vType id="{NEVER_TELEPORTED}" timeToTeleport="-1"/></additional>')
+        additionals = (*silenced(scenario.configuration.additionals, folder), types)
+        os.chdir(folder)  # what a device writes relative to the working folder
+        try:
+            libsumo.start(["sumo", *scenario.arguments, "-a", ",".join(map(str, additionals))])
+        except libsumo.TraCIException as error:
+            raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {error}") from None
+        self._bodies: dict[str, tuple[ObjectClass, float, float]] = {}
+
+    @property
+    def time(self) -> float:
+        """[s]"""
+        return float(libsumo.simulation.getTime())
+
+    @property
+    def is_exhausted(self) -> bool:
+        """Whether no vehicle runs or waits for departure any more."""
+        return bool(libsumo.simulation.getMinExpectedNumber() <= 0)
+
+    def step(self) -> None:
+        """Advance by one world step.
+
+        Raises:
+            ScenarioError: SUMO gives up (malformed routes surface only when they are read).
+        """
+        try:
+            libsumo.simulationStep()
+        except libsumo.TraCIException as error:
+            raise ScenarioError(f"SUMO stopped at {self.time:g} s: {error}") from None
+
+    def departed(self) -> tuple[str, ...]:
+        """Vehicles inserted in the last step."""
+        return tuple(libsumo.simulation.getDepartedIDList())
+
+    def has(self, vehicle: str) -> bool:
+        """Whether the vehicle is in the simulation (inserted and not removed)."""
+        try:
+            libsumo.vehicle.getRoadID(vehicle)
+        except libsumo.TraCIException:
+            return False
+        return True
+
+    def entry(self, vehicle: str, settings: Sequence[str]) -> Entry:
+        """How an inserted vehicle stands, and its "dvca." parameters among `settings`; changes nothing."""
+        of = libsumo.vehicle
+        x, y = of.getPosition(vehicle)
+        texts = {name: of.getParameter(vehicle, f"dvca.{name}") for name in settings}
+        return Entry(
+            ego=vehicle,
+            time=self.time,
+            front_x=x,
+            front_y=y,
+            heading=math.radians(90.0 - of.getAngle(vehicle)),
+            speed=max(0.0, of.getSpeed(vehicle)),
+            length=of.getLength(vehicle),
+            width=of.getWidth(vehicle),
+            vehicle_class=of.getVehicleClass(vehicle),
+            edges=tuple(of.getRoute(vehicle)),
+            lane=of.getLaneID(vehicle),
+            position=of.getLanePosition(vehicle),
+            parameters={name: text for name, text in texts.items() if text},
+        )
+
+    def adopt(self, entry: Entry, radius: float) -> None:
+        """Take an inserted vehicle out of SUMO's hands; watch what is within `radius` [m] of it.
+
+        A standing ego must not be teleported out of a jam, so it gets a type of its own.
+        """
+        of = libsumo.vehicle
+        of.setType(entry.ego, NEVER_TELEPORTED)
+        of.setLength(entry.ego, entry.length)
+        of.setWidth(entry.ego, entry.width)
+        of.setVehicleClass(entry.ego, entry.vehicle_class)
+        of.subscribeContext(entry.ego, tc.CMD_GET_VEHICLE_VARIABLE, radius, _VEHICLE)
+        of.subscribeContext(entry.ego, tc.CMD_GET_PERSON_VARIABLE, radius, _PERSON)
+
+    def place(self, ego: str, truth: EgoTruth, front: float, lane: str) -> None:
+        """Put the ego where its own dynamics say; effective with the next step.
+
+        `lane` is the lane of the route it is on: without it SUMO may pick a crossing junction lane.
+        """
+        edge, _, index = lane.rpartition("_")
+        x = truth.x + front * math.cos(truth.heading)
+        y = truth.y + front * math.sin(truth.heading)
+        libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, 90.0 - math.degrees(truth.heading), keepRoute=2)
+        # SUMO derives a wrong speed on junction and opposite lanes; drivers behind must react to the true one.
+        libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
+
+    def objects(self, ego: str) -> ObjectsTruth:
+        """Every moving body near an adopted ego: vehicles (parked ones too), people on foot."""
+        bodies: list[_Body] = []
+        for name, values in libsumo.vehicle.getContextSubscriptionResults(ego).items():
+            if tc.VAR_POSITION in values and name != ego and abs(values[tc.VAR_POSITION][0]) < _NOWHERE:
+                bodies.append(self._vehicle(name, values))
+            if tc.VAR_POSITION3D in values and not values[tc.VAR_VEHICLE]:
+                bodies.append(self._person(name, values))
+        rows = np.array([body[2] for body in bodies], dtype=np.float64).reshape(-1, 6)
+        boxes, speeds = rows[:, :5], rows[:, 5:]
+        return ObjectsTruth(
+            self.time,
+            tuple(body[0] for body in bodies),
+            np.array([body[1] for body in bodies], dtype=np.int64),
+            boxes,
+            speeds * np.column_stack([np.cos(boxes[:, 2]), np.sin(boxes[:, 2])]),
+            tuple(body[3] for body in bodies),
+        )
+
+    def signals(self, signal_ids: Sequence[str]) -> dict[str, SignalColour]:
+        """Colours of signal heads, given as "traffic light/link index"."""
+        states: dict[str, str] = {}
+        colours: dict[str, SignalColour] = {}
+        for signal in signal_ids:
+            light, _, link = signal.rpartition("/")
+            if light not in states:
+                states[light] = libsumo.trafficlight.getRedYellowGreenState(light)
+            colours[signal] = _COLOURS[states[light][int(link)]]
+        return colours
+
+    def obstacles(self) -> Obstacles:
+        """The scenario's POIs and polygons that are bodies."""
+        names: list[str] = []
+        rows: list[tuple[float, float, float, float, float]] = []
+        for name in libsumo.poi.getIDList():
+            of = libsumo.poi
+            if of.getType(name).startswith(OBSTACLE):
+                names.append(f"poi:{name}")
+                angle = math.radians(90.0 - of.getAngle(name))
+                rows.append(box_of_poi(of.getPosition(name), angle, of.getWidth(name), of.getHeight(name)))
+        for name in libsumo.polygon.getIDList():
+            shape_of = libsumo.polygon
+            if shape_of.getType(name).startswith(OBSTACLE):
+                boxes = boxes_of_polygon(shape_of.getShape(name), shape_of.getFilled(name), shape_of.getLineWidth(name))
+                names += [f"polygon:{name}" if len(boxes) == 1 else f"polygon:{name}#{part}" for part in range(len(boxes))]
+                rows += boxes
+        return Obstacles(tuple(names), np.array(rows, dtype=np.float64).reshape(-1, 5))
+
+    def close(self) -> None:
+        """End the simulation; the process may start another."""
+        libsumo.close()
+
+    def _vehicle(self, name: str, values: dict[int, Any]) -> _Body:
+        if name not in self._bodies:
+            of = libsumo.vehicle
+            is_two_wheeled = of.getVehicleClass(name) in _TWO_WHEELED
+            kind = ObjectClass.BICYCLE if is_two_wheeled else ObjectClass.VEHICLE
+            self._bodies[name] = (kind, of.getLength(name), of.getWidth(name))
+        kind, length, width = self._bodies[name]
+        # A person of the same name overwrote the other values.
+        is_mixed = tc.VAR_POSITION3D in values
+        heading = math.radians(90.0 - (libsumo.vehicle.getAngle(name) if is_mixed else values[tc.VAR_ANGLE]))
+        speed = libsumo.vehicle.getSpeed(name) if is_mixed else values[tc.VAR_SPEED]
+        x, y = values[tc.VAR_POSITION]
+        half = length / 2.0
+        box = (x - half * math.cos(heading), y - half * math.sin(heading), heading, length, width)
+        return name, kind, (*box, speed), values[tc.VAR_LANE_ID]
+
+    def _person(self, name: str, values: dict[int, Any]) -> _Body:
+        key = f"person:{name}"
+        if key not in self._bodies:
+            of = libsumo.person
+            self._bodies[key] = (ObjectClass.PEDESTRIAN, of.getLength(name), of.getWidth(name))
+        kind, length, width = self._bodies[key]
+        is_mixed = tc.VAR_POSITION in values
+        heading = math.radians(90.0 - (libsumo.person.getAngle(name) if is_mixed else values[tc.VAR_ANGLE]))
+        speed = libsumo.person.getSpeed(name) if is_mixed else values[tc.VAR_SPEED]
+        x, y, _ = values[tc.VAR_POSITION3D]
+        return key, kind, (x, y, heading, length, width, speed), ""

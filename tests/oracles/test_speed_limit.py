@@ -1,0 +1,49 @@
+import pytest
+from oracle_scenes import drive, judged, moment, straight_road
+
+from dvca_sumo.oracles.speed_limit import SpeedLimit
+from dvca_sumo.violations import Answer
+
+
+def test_driving_above_limit_and_tolerance_is_a_violation_after_the_dwell_time() -> None:
+    (violation,) = judged(SpeedLimit, drive(20.0, 80.0, 15.0)).violations
+    assert violation.kind == "speed_limit"
+    assert violation.time == pytest.approx(1.0)
+    assert (violation.value, violation.threshold) == (15.0, 13.9)
+
+
+def test_driving_just_inside_the_tolerance_is_fine() -> None:
+    assert judged(SpeedLimit, drive(20.0, 80.0, 14.89)).answer is Answer.KEPT
+
+
+def test_an_excess_shorter_than_the_dwell_time_is_fine() -> None:
+    moments = [moment(0.1 * k, 20.0 + k, 15.5 if k % 10 else 13.0) for k in range(50)]
+    assert judged(SpeedLimit, moments).answer is Answer.KEPT
+
+
+def test_two_episodes_are_two_violations() -> None:
+    moments = [moment(0.1 * k, 20.0 + k, 13.0 if 15 < k < 20 else 16.0) for k in range(40)]
+    assert len(judged(SpeedLimit, moments).violations) == 2
+
+
+def test_a_slower_lane_counts_from_its_line_on() -> None:
+    route = straight_road(limits=lambda station: 13.9 if station < 100.0 else 8.3)
+    assert judged(SpeedLimit, drive(60.0, 99.9, 13.0), route).answer is Answer.KEPT
+    (violation,) = judged(SpeedLimit, drive(60.0, 130.0, 13.0), route).violations
+    assert violation.time == pytest.approx((100.0 - 60.0) / 13.0 + 1.0, abs=0.15)
+
+
+def test_the_driving_advice_inside_a_junction_is_no_limit() -> None:
+    def limits(station: float) -> float:
+        return 5.0 if 100.0 <= station < 120.0 else 13.9
+
+    inside = straight_road(limits=limits, lane=lambda station: ":c_0_0" if 100.0 <= station < 120.0 else "in_0")
+    assert judged(SpeedLimit, drive(60.0, 140.0, 10.0), inside).answer is Answer.KEPT
+    assert judged(SpeedLimit, drive(60.0, 140.0, 10.0), straight_road(limits=limits)).answer is Answer.VIOLATED
+
+
+def test_it_cannot_tell_the_limit_off_the_route() -> None:
+    moments = [moment(0.1 * k, 20.0 + k, 10.0, offset=20.0) for k in range(20)]
+    found = judged(SpeedLimit, moments)
+    assert found.answer is Answer.UNKNOWN
+    assert "off its route" in found.reason

@@ -1,0 +1,193 @@
+"""Made-up roads, scripted objects and an ego that moves exactly as planned."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.geometry.boxes import box_of, distances
+from dvca_sumo.geometry.polyline import Polyline
+from dvca_sumo.messages import (
+    PREDICTION_TIMES,
+    Floats,
+    LocalizationEstimate,
+    ObjectClass,
+    PredictedObjects,
+    SignalColour,
+    TrackedObjects,
+    Trajectory,
+    VehicleShape,
+)
+from dvca_sumo.roadmap.route import Control, Crossing, Route, StopLine
+from dvca_sumo.stack.planning import Planner, PlanningConfig
+
+SHAPE = VehicleShape(length=4.6, width=1.8, wheelbase=2.7, rear_overhang=0.9)
+LIMIT = 13.9
+
+
+def straight_points(length: float = 600.0) -> Floats:
+    return np.column_stack([np.arange(0.0, length + 0.5), np.zeros(int(length) + 1)])
+
+
+def curve_points(radius: float, before: float = 100.0, after: float = 150.0) -> Floats:
+    """Straight on, a quarter circle to the left with 10 m of easing at either end, straight on."""
+    turning = math.pi / 2.0 * radius
+    stations = np.arange(0.0, before + turning + 10.0 + after + 0.5)
+    curvature = np.interp(stations, [before, before + 10.0, before + turning, before + turning + 10.0], [0, 1, 1, 0])
+    headings = np.concatenate(([0.0], np.cumsum(0.5 * (curvature[1:] + curvature[:-1]) / radius)))
+    middle = 0.5 * (headings[1:] + headings[:-1])
+    return np.column_stack([np.cumsum(np.append(0.0, np.cos(middle))), np.cumsum(np.append(0.0, np.sin(middle)))])
+
+
+def road(
+    points: Floats | None = None,
+    *,
+    destination: float | None = None,
+    limit: float = LIMIT,
+    lanes_left: int = 0,
+    stop_lines: Sequence[StopLine] = (),
+    crossings: Sequence[Crossing] = (),
+) -> Route:
+    """One lane 3.2 m wide along `points`, `lanes_left` more of the same direction to its left."""
+    line = Polyline(straight_points() if points is None else points)
+    ones = np.ones(len(line))
+    return Route(
+        line=line,
+        lane_ids=("ego_0",) * len(line),
+        speed_limits=limit * ones,
+        curvatures=line.curvatures,
+        lane_left=1.6 * ones,
+        lane_right=-1.6 * ones,
+        road_left=(1.6 + 3.2 * lanes_left) * ones,
+        road_right=-1.6 * ones,
+        start=5.0,
+        destination=line.length - 5.0 if destination is None else destination,
+        stop_lines=tuple(stop_lines),
+        crossings=tuple(crossings),
+    )
+
+
+def stop_line(station: float, control: Control, **changes: Any) -> StopLine:
+    """A junction 12 m wide behind the line, met by "major_0" (which has priority where the rules say so)."""
+    line = StopLine(
+        station=station,
+        lane="ego_0",
+        control=control,
+        signal_id="J/2" if control is Control.SIGNAL else None,
+        position=(station, 0.0),
+        yields_to=frozenset({"major_0"}),
+        crosses=frozenset({"major_0", "minor_0"}),
+        exit_station=station + 12.0,
+    )
+    return msgspec.structs.replace(line, **changes)
+
+
+class Actor(msgspec.Struct, frozen=True):
+    """Somebody who waits at a place until `leaves` and then moves straight on at constant speed."""
+
+    track: int
+    kind: ObjectClass
+    x: float
+    y: float
+    heading: float = 0.0
+    speed: float = 0.0
+    leaves: float = 0.0
+    stays_from: float = math.inf
+    size: tuple[float, float] = (4.5, 1.8)
+    lanes: tuple[str, ...] = ()
+
+    def speed_at(self, time: float) -> float:
+        return self.speed if self.leaves <= time < self.stays_from else 0.0
+
+    def box_at(self, time: float) -> list[float]:
+        way = self.speed * (min(max(time, self.leaves), max(self.stays_from, self.leaves)) - self.leaves)
+        x = self.x + way * math.cos(self.heading)
+        return [x, self.y + way * math.sin(self.heading), self.heading, *self.size]
+
+
+def person(track: int, x: float, y: float, **changes: Any) -> Actor:
+    return Actor(track, ObjectClass.PEDESTRIAN, x, y, size=(0.5, 0.6), **changes)
+
+
+def cone(track: int, x: float, y: float = 0.0) -> Actor:
+    return Actor(track, ObjectClass.STATIC, x, y, size=(0.4, 0.4))
+
+
+def car(track: int, x: float, y: float = 0.0, **changes: Any) -> Actor:
+    return Actor(track, ObjectClass.VEHICLE, x, y, **changes)
+
+
+def predicted(actors: Sequence[Actor], time: float) -> PredictedObjects:
+    """Each actor with one hypothesis: constant velocity."""
+    count = len(actors)
+    boxes = np.array([actor.box_at(time) for actor in actors]).reshape(count, 5)
+    speeds = np.array([actor.speed_at(time) for actor in actors])
+    headings = boxes[:, 2]
+    velocities = np.column_stack([speeds * np.cos(headings), speeds * np.sin(headings)])
+    poses = np.repeat(boxes[:, None, :3], len(PREDICTION_TIMES), axis=1)
+    poses[:, :, :2] += velocities[:, None, :] * PREDICTION_TIMES[None, :, None]
+    objects = TrackedObjects(
+        time=time,
+        ids=np.array([actor.track for actor in actors], dtype=np.int64),
+        classes=np.array([int(actor.kind) for actor in actors], dtype=np.int64),
+        boxes=boxes,
+        velocities=velocities,
+        signals={},
+    )
+    lanes = tuple(actor.lanes for actor in actors)
+    return PredictedObjects(objects, np.arange(count), np.ones(count), poses, lanes)
+
+
+def believed(x: float, y: float = 0.0, heading: float = 0.0, speed: float = 0.0, time: float = 0.0) -> Any:
+    return LocalizationEstimate(time, x, y, heading, speed, 0.0, 0.0)
+
+
+class Drive(msgspec.Struct):
+    """What happened, one row or entry every 0.1 s."""
+
+    states: Floats  # (n, 7) as in Trajectory.points, time absolute
+    trajectories: list[Trajectory]
+    clearances: Floats  # (n,) [m] to the nearest actor
+
+    @property
+    def speeds(self) -> Floats:
+        return self.states[:, 4]
+
+    @property
+    def decisions(self) -> list[str]:
+        return [trajectory.decision for trajectory in self.trajectories]
+
+    @property
+    def fronts(self) -> Floats:
+        """[m] x of the front bumper, on a straight road along x."""
+        return self.states[:, 1] + SHAPE.front
+
+
+def drive(
+    route: Route,
+    seconds: float,
+    *,
+    speed: float = 0.0,
+    station: float = 5.0,
+    actors: Sequence[Actor] = (),
+    signals: Callable[[float], dict[str, SignalColour]] = lambda _: {},
+    config: PlanningConfig | None = None,
+) -> Drive:
+    """Drive from `station` (rear axle) at `speed`, following every trajectory exactly."""
+    planner = Planner(config or PlanningConfig(), route, SHAPE)
+    x, y, heading = route.line.poses(np.array([station]))[0].tolist()
+    estimate = LocalizationEstimate(0.0, x, y, heading, speed, 0.0, 0.0)
+    states, trajectories, clearances = [], [], []
+    for index in range(round(seconds * 10)):
+        time = 0.1 * index
+        trajectory = planner.step(estimate, predicted(actors, time), signals(time))
+        trajectories.append(trajectory)
+        states.append([time, *trajectory.points[0, 1:]])
+        boxes = np.array([actor.box_at(time) for actor in actors]).reshape(-1, 5)
+        ego = box_of(estimate.x, estimate.y, estimate.heading, SHAPE)
+        clearances.append(float(distances(ego, boxes).min()) if len(boxes) else math.inf)
+        _, x, y, heading, speed, acceleration, curvature = trajectory.points[1].tolist()
+        estimate = LocalizationEstimate(0.1 * (index + 1), x, y, heading, speed, acceleration, speed * curvature)
+    return Drive(np.array(states), trajectories, np.array(clearances))
