@@ -14,6 +14,7 @@ from dvca_sumo.messages import (
     Component,
     ControlCommand,
     Floats,
+    Integers,
     LocalizationEstimate,
     MessageId,
     ObjectClass,
@@ -152,7 +153,7 @@ def _of_predictions(said: PredictedObjects, occasion: Occasion, focus: str | Non
     return found
 
 
-def _of_future(name: str, said: PredictedObjects, own: Floats, known: str, occasion: Occasion) -> list[Difference]:
+def _of_future(name: str, said: PredictedObjects, own: Integers, known: str, occasion: Occasion) -> list[Difference]:
     future = occasion.futures.of(known, occasion.moment.time)
     if future is None:
         return []

@@ -21,6 +21,11 @@ from typing import Generic, TypeVar
 
 import msgspec
 
+if sys.platform == "win32":
+    _CONTEXT = multiprocessing.get_context("spawn")
+else:
+    _CONTEXT = multiprocessing.get_context("fork")
+
 Result = TypeVar("Result")
 
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
@@ -39,12 +44,11 @@ class _Child(Generic[Result]):
     """One running job."""
 
     def __init__(self, index: int, job: Callable[[], Result], log: Path, timeout: float) -> None:
-        context = multiprocessing.get_context("fork" if hasattr(os, "fork") else "spawn")
         self.index = index
         self.log = log
         self.deadline = time.monotonic() + timeout
-        self.receiver, sender = context.Pipe(duplex=False)
-        self.process: BaseProcess = context.Process(target=_work, args=(job, sender, log, os.getpid()))
+        self.receiver, sender = _CONTEXT.Pipe(duplex=False)
+        self.process: BaseProcess = _CONTEXT.Process(target=_work, args=(job, sender, log, os.getpid()))
         self.process.start()
         sender.close()
 

@@ -23,6 +23,7 @@ from dvca_sumo.messages import (
     Y,
     ControlCommand,
     Floats,
+    Integers,
     LocalizationEstimate,
     Message,
     PredictedObjects,
@@ -193,13 +194,14 @@ def _with_boxes(
     return msgspec.structs.replace(tracked, boxes=boxes)
 
 
-def _rows(tracked: TrackedObjects, parameters: Parameters, occasion: Occasion) -> Floats:
+def _rows(tracked: TrackedObjects, parameters: Parameters, occasion: Occasion) -> Integers:
     return rows_of(str(parameters["object"]), tracked, occasion)
 
 
 def _in_map(parameters: Parameters, ahead: str, left: str, occasion: Occasion) -> Floats:
     vector = np.array([[_number(parameters, ahead), _number(parameters, left)]])
-    return rotated(vector, occasion.believed.heading)[0]
+    turned: Floats = rotated(vector, occasion.believed.heading)[0]
+    return turned
 
 
 def _number(parameters: Parameters, name: str) -> float:

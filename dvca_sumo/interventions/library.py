@@ -3,6 +3,7 @@
 import difflib
 import math
 import tomllib
+from collections.abc import Collection
 from functools import cache
 
 import msgspec
@@ -138,7 +139,7 @@ def _value(fault: str, key: str, parameter: Parameter, text: str) -> float | str
     return number
 
 
-def _nearest(name: str, known: dict[str, Parameter] | dict[str, FaultType] | dict[str, object]) -> str:
+def _nearest(name: str, known: Collection[str]) -> str:
     close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.4)
     if close:
         return f"; did you mean {close[0]!r}?"

@@ -17,6 +17,8 @@ from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Ending, Judgement
 
+__all__ = ["ORACLES", "Oracle", "judge", "judges"]
+
 ORACLES: tuple[type[Oracle], ...] = (
     Collision,
     TimeToCollision,

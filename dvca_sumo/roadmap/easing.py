@@ -62,9 +62,9 @@ def _relaxed(points: Floats, original: Floats, limit: float) -> Floats:
     bending = np.diff(np.eye(len(nodes)), n=2, axis=0)
     operator = np.concatenate([bending * normals[:, axis] for axis in (0, 1)])
     offsets = _boxed(operator, (bending @ line).T.ravel(), low, high)
-    offsets = np.interp(np.arange(len(points)), nodes, offsets)
-    across = np.column_stack([np.interp(np.arange(len(points)), nodes, normals[:, axis]) for axis in (0, 1)])
-    return points + offsets[:, None] * across
+    moves = offsets[:, None] * normals
+    every = np.arange(len(points))
+    return points + np.column_stack([np.interp(every, nodes, moves[:, axis]) for axis in (0, 1)])
 
 
 def _boxed(operator: Floats, target: Floats, low: Floats, high: Floats) -> Floats:

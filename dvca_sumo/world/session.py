@@ -41,6 +41,7 @@ _COLOURS = {
 _NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
 _Row = tuple[float, float, float, float, float, float]  # box and speed
 _Body = tuple[str, ObjectClass, _Row, str]  # name, class, row, lane
+_ANY_BRAKING = 1e4  # [m/s^2] SUMO's own driver, overruled, would warn of braking for the arrival at every step
 _TWO_WHEELED = ("bicycle", "moped", "motorcycle", "scooter")
 
 
@@ -147,6 +148,7 @@ class Session:
         of.setLength(entry.ego, entry.length)
         of.setWidth(entry.ego, entry.width)
         of.setVehicleClass(entry.ego, entry.vehicle_class)
+        of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
         of.subscribeContext(entry.ego, tc.CMD_GET_VEHICLE_VARIABLE, radius, _VEHICLE)
         of.subscribeContext(entry.ego, tc.CMD_GET_PERSON_VARIABLE, radius, _PERSON)
 

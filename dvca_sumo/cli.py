@@ -1,0 +1,204 @@
+"""The command line: arguments, exit codes, progress; nothing else."""
+
+import json
+import os
+import sys
+import time
+from enum import IntEnum
+from pathlib import Path
+from typing import NoReturn
+
+import click
+
+from dvca_sumo.analysis.attribution import (
+    Attribution,
+    AttributionStoppedError,
+    Progress,
+    Request,
+    attribute,
+)
+from dvca_sumo.analysis.components import Verdict
+from dvca_sumo.analysis.dtest import Probe
+from dvca_sumo.engine.protocol import RunFailedError
+from dvca_sumo.engine.replay import ReplayEngine
+from dvca_sumo.installation import scenario_path
+from dvca_sumo.interventions import COMMON, Fault, FaultError, fault_library, planted_fault
+from dvca_sumo.interventions.library import Parameter
+from dvca_sumo.record import Record
+from dvca_sumo.report.result import Json, Timing, result_of
+from dvca_sumo.report.terminal import verdict_text
+from dvca_sumo.roadmap import RoadMapError
+from dvca_sumo.scenario import Scenario, ScenarioError, load_scenario
+from dvca_sumo.stack.reference import StackError
+
+_REPEATS = 3
+
+
+class ExitCode(IntEnum):
+    """The contract's exit codes."""
+
+    NO_VIOLATION = 0
+    ATTRIBUTED = 1
+    USAGE = 2
+    BAD_INPUT = 3
+    UNRESOLVED = 4
+    INTERNAL = 70
+    INTERRUPTED = 130
+
+
+class _Terminal(Progress):
+    """Progress on standard error."""
+
+    def __init__(self) -> None:
+        self.begin = time.perf_counter()
+        self.factual_wall = 0.0
+        self._probes = 0
+
+    def factual(self, record: Record) -> None:
+        self.factual_wall = time.perf_counter() - self.begin
+        said = f"{len(record.violations)} violation(s)" if record.violations else "no violation"
+        _tell(f"factual run: {said}, {self.factual_wall:.1f} s")
+
+    def probe(self, probe: Probe) -> None:
+        self._probes += 1
+        ideal = "+".join(component.value for component in probe.question.ideal) or "nothing (the premise)"
+        since = f" from #{probe.question.since.index}" if probe.question.since is not None else ""
+        _tell(f"probe {self._probes}: ideal {ideal}{since}: {probe.outcome.value}, {probe.wall:.1f} s")
+
+    def timing(self, engine: ReplayEngine) -> Timing:
+        attribution = time.perf_counter() - self.begin - self.factual_wall
+        return Timing(self.factual_wall, attribution, engine.name, engine.jobs)
+
+
+@click.group()
+@click.version_option(package_name="dvca-sumo")
+def program() -> None:
+    """Find which component of an automated driving system caused a violation, and which message to open first."""
+
+
+@program.command()
+@click.argument("sumocfg", type=click.Path(path_type=Path))
+@click.option("--fault", "faults", multiple=True, metavar="NAME[:key=value,...]", help="Plant a fault; see `faults`.")
+@click.option("--ego", metavar="ID|auto", help="The ego's vehicle id, or auto to pick one.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="For SUMO's drivers and the ADS's sensors.")
+@click.option("--stack", metavar="MODULE:FACTORY|FILE.toml", help="Your own stack, or parameters of the reference one.")
+@click.option("--engine", type=click.Choice(["replay"]), default="replay", show_default=True)
+@click.option("--jobs", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Runs at once.")
+@click.option("--jitter", is_flag=True, help="Draw schedule and sensor noise anew for each run; majority of repeats.")
+@click.option("--repeats", type=click.IntRange(1), help=f"Runs of each question in jitter mode [default: {_REPEATS}]")
+@click.option("--begin", type=float, metavar="T", help="Start of the simulation [s].")
+@click.option("--end", type=float, metavar="T", help="Latest end of the simulation [s].")
+@click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Folder for result.json.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
+def run(  # noqa: PLR0913 - one parameter an option
+    sumocfg: Path,
+    faults: tuple[str, ...],
+    ego: str | None,
+    seed: int | None,
+    stack: str | None,
+    engine: str,  # noqa: ARG001 - one engine as yet
+    jobs: int,
+    jitter: bool,  # noqa: FBT001
+    repeats: int | None,
+    begin: float | None,
+    end: float | None,
+    output: Path | None,
+    as_json: bool,  # noqa: FBT001
+) -> None:
+    """Run a scenario; if a violation occurs, find the component and the message that caused it.
+
+    SUMOCFG is any SUMO configuration. The ego is --ego, or the vehicle with the parameter
+    dvca.ego=true, or the vehicle with the id "ego". Nothing is written beside the configuration.
+
+    \b
+    Exit codes: 0 no violation; 1 violation, attributed; 2 usage; 3 bad input;
+    4 violation, but unresolved or not reproducible; 70 internal error; 130 interrupted.
+    """
+    if repeats is not None and not jitter:
+        raise click.UsageError("--repeats goes with --jitter: in exact mode every run is the same")
+    scenario = load_scenario(scenario_path(sumocfg), ego, seed, begin, end)
+    planted = tuple(planted_fault(text) for text in faults)
+    request = Request(scenario, planted, (repeats or _REPEATS) if jitter else None)
+    chosen = ReplayEngine(scenario.configuration.net, stack, jobs)
+    terminal = _Terminal()
+    try:
+        found = attribute(chosen, request, terminal)
+    except AttributionStoppedError as stopped:
+        _publish(scenario, planted, stopped.partial, terminal.timing(chosen), output, as_json=as_json)
+        raise KeyboardInterrupt from None
+    _publish(scenario, planted, found, terminal.timing(chosen), output, as_json=as_json)
+    sys.exit(_exit_code(found))
+
+
+@program.command()
+def faults() -> None:
+    """List the fault library: name, component, parameters with units."""
+    for name, entry in fault_library().items():
+        click.echo(f"{name}  ({entry.component.value})\n    {entry.summary}")
+        for key, parameter in entry.parameters.items():
+            click.echo(f"    {_described(key, parameter)}")
+    click.echo("every fault")
+    for key, parameter in COMMON.items():
+        click.echo(f"    {_described(key, parameter)}")
+
+
+def main() -> NoReturn:
+    """The program: every error is one line and an exit code of the contract."""
+    try:
+        program.main(standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        _leave(ExitCode.USAGE)
+    except (ScenarioError, FaultError, StackError, RoadMapError) as error:
+        _tell(f"error: {error}")
+        _leave(ExitCode.BAD_INPUT)
+    except RunFailedError as error:
+        _tell(f"error: {error}")
+        _leave(ExitCode.INTERNAL)
+    except (KeyboardInterrupt, click.Abort):
+        _tell("interrupted")
+        _leave(ExitCode.INTERRUPTED)
+    except Exception as error:  # noqa: BLE001 - the last line of defence: a defect of this program
+        _tell(f"internal error: {type(error).__name__}: {error} (set DVCA_SUMO_TRACEBACK=1 to see where)")
+        if os.environ.get("DVCA_SUMO_TRACEBACK"):
+            raise
+        _leave(ExitCode.INTERNAL)
+    sys.exit(ExitCode.NO_VIOLATION)
+
+
+def _publish(
+    scenario: Scenario, faults: tuple[Fault, ...], found: Attribution, timing: Timing, output: Path | None, *, as_json: bool
+) -> None:
+    result = result_of(scenario, faults, found, timing)
+    if output is not None:
+        output.mkdir(parents=True, exist_ok=True)
+        _write(output / "result.json", result)
+    click.echo(json.dumps(result, indent=1) if as_json else verdict_text(found, timing))
+
+
+def _write(path: Path, result: Json) -> None:
+    """Whole or not at all: a reader never sees half a file."""
+    draft = path.with_suffix(".part")
+    draft.write_text(json.dumps(result, indent=1) + "\n")
+    draft.replace(path)
+
+
+def _exit_code(found: Attribution) -> ExitCode:
+    if found.verdict is Verdict.NONE:
+        return ExitCode.NO_VIOLATION
+    return ExitCode.ATTRIBUTED if found.verdict in (Verdict.COMPONENT, Verdict.PLANNING) else ExitCode.UNRESOLVED
+
+
+def _described(key: str, parameter: Parameter) -> str:
+    allowed = f", {parameter.low:g} to {parameter.high:g}" if parameter.kind == "number" else ""
+    unit = f" [{parameter.unit}{allowed}]" if parameter.unit else ""
+    default = f"default {parameter.default}" if parameter.default != "" else "unset by default"
+    return f"{key:<8}{unit} {parameter.summary} ({default})"
+
+
+def _tell(line: str) -> None:
+    click.echo(line, err=True)
+
+
+def _leave(code: ExitCode) -> NoReturn:
+    sys.exit(int(code))

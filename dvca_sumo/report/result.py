@@ -1,0 +1,188 @@
+"""The result of a run as data: the JSON contract."""
+
+import math
+import platform
+from importlib.metadata import PackageNotFoundError, version
+
+import msgspec
+
+from dvca_sumo.analysis.attribution import Attribution, Planted
+from dvca_sumo.analysis.dtest import Probe
+from dvca_sumo.interventions import Fault
+from dvca_sumo.messages import COMPONENTS
+from dvca_sumo.record import MessageMark
+from dvca_sumo.scenario import STEP_LENGTH, Scenario
+from dvca_sumo.violations import Violation
+
+SCHEMA = 1
+Json = dict[str, object]
+
+
+class Timing(msgspec.Struct, frozen=True):
+    """What an analysis cost."""
+
+    factual_wall_s: float
+    attribution_wall_s: float
+    engine: str
+    jobs: int
+
+
+def result_of(scenario: Scenario, faults: tuple[Fault, ...], found: Attribution, timing: Timing) -> Json:
+    """The whole result, of JSON types only."""
+    record = found.record
+    counts = record.message_counts
+    total = sum(counts.values())
+    simulated = record.simulated + sum(probe.simulated for probe in found.probes)
+    is_wrong = found.planted is not None and not found.planted.message_success
+    has_message = found.message is not None and not is_wrong
+    return {
+        "schema": SCHEMA,
+        "scenario": {
+            "config": str(scenario.configuration.path),
+            "ego": record.ego,
+            "seed": scenario.seed,
+            "step_length": STEP_LENGTH,
+            "begin": scenario.begin,
+            "end": scenario.end,
+            "overrides": [msgspec.to_builtins(override) for override in scenario.overrides],
+            "thresholds": msgspec.to_builtins(record.thresholds),
+        },
+        "faults": [_fault(fault) for fault in faults],
+        "violations": [_violation(violation) for violation in record.violations],
+        "judgements": [
+            {"kind": one.kind, "answer": one.answer.value, "reason": one.reason} for one in record.judgements
+        ],
+        "verdict": found.verdict.value,
+        "reason": found.reason,
+        "violation": None if found.violation is None else _violation(found.violation),
+        "component": _component(found),
+        "alternatives": [] if found.components is None else [one.value for one in found.components.alternatives],
+        "substitutions": _substitutions(found),
+        "message": None if found.message is None else {"component": found.message.component.value, **_mark(found.message)},
+        "differences": [{"field": one.field, "text": one.text} for one in found.differences],
+        "interval": _interval(found),
+        "probes": [_probe(probe) for probe in found.probes],
+        "messages": {"total": total, **{component.value: counts[component] for component in COMPONENTS}},
+        "reduction_rate": 1.0 - 1.0 / total if has_message else 0.0,
+        "planted": None if found.planted is None else _planted(found.planted),
+        "settled_at": _finite(found.until),
+        "timing": {
+            **msgspec.to_builtins(timing),
+            "ratio": timing.attribution_wall_s / timing.factual_wall_s,
+            "simulated_s": simulated,
+        },
+        "reproducible": found.is_reproducible,
+        "digest": found.digest,
+        "versions": {"dvca_sumo": _version("dvca-sumo"), "sumo": _version("libsumo"), "python": platform.python_version()},
+    }
+
+
+def _fault(fault: Fault) -> Json:
+    selection = {
+        key: _finite(value) if isinstance(value, float) else value
+        for key, value in msgspec.to_builtins(fault.selection).items()
+        if value is not None and value != math.inf
+    }
+    return {
+        "name": fault.name,
+        "component": fault.component.value,
+        "parameters": dict(fault.parameters),
+        "selection": selection,
+    }
+
+
+def _violation(violation: Violation) -> Json:
+    return {
+        "kind": violation.kind,
+        "category": violation.category.value,
+        "time": violation.time,
+        "object": violation.object,
+        "position": list(violation.position),
+        "lane": violation.lane,
+        "value": violation.value,
+        "threshold": violation.threshold,
+        "contact": None if violation.contact is None else violation.contact.value,
+        "detail": violation.detail,
+    }
+
+
+def _component(found: Attribution) -> str | None:
+    if found.components is None or found.components.component is None:
+        return None
+    return found.components.component.value
+
+
+def _substitutions(found: Attribution) -> Json | None:
+    answer = found.components
+    if answer is None:
+        return None
+    singles = {component.value: outcome.value for component, outcome in answer.singles.items()}
+    return {"all": answer.all_ideal.value, **singles}
+
+
+def _interval(found: Attribution) -> Json | None:
+    answer = found.messages
+    if answer is None:
+        return None
+    first = answer.first_violating
+    return {
+        "last_safe": {"component": answer.last_safe.component.value, **_mark(answer.last_safe)},
+        "first_violating": None if first is None else {"component": first.component.value, **_mark(first)},
+        "adjacent": answer.is_adjacent,
+        "monotone": answer.is_monotone,
+        "probes": [probe.id for probe in found.evidence],
+    }
+
+
+def _mark(mark: MessageMark) -> Json:
+    return {"index": mark.index, "time": mark.time, "state": list(mark.state)}
+
+
+def _probe(probe: Probe) -> Json:
+    since = probe.question.since
+    return {
+        "id": probe.id,
+        "ideal": [component.value for component in probe.question.ideal],
+        "from": None if since is None else _mark(since),
+        "outcome": probe.outcome.value,
+        "violation": None if probe.violation is None else _violation(probe.violation),
+        "reason": probe.reason,
+        "jitter": probe.jitter,
+        "passes": probe.passes,
+        "residual": probe.residual,
+        "digest": probe.digest,
+        "simulated_s": probe.simulated,
+        "wall_s": probe.wall,
+    }
+
+
+def _planted(planted: Planted) -> Json:
+    return {
+        "component": planted.component.value,
+        "altered": _ranges(planted.altered),
+        "component_success": planted.component_success,
+        "message_success": planted.message_success,
+        "message_distance_s": planted.message_distance,
+    }
+
+
+def _ranges(indices: tuple[int, ...]) -> list[int | list[int]]:
+    """Ascending whole numbers, runs of them as [first, last]."""
+    found: list[list[int]] = []
+    for index in indices:
+        if found and index == found[-1][1] + 1:
+            found[-1][1] = index
+        else:
+            found.append([index, index])
+    return [first if first == last else [first, last] for first, last in found]
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:  # run from a source tree
+        return "uninstalled"

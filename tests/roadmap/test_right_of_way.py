@@ -1,0 +1,147 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from dvca_sumo.roadmap import Control, RoadMap, StopLine
+
+NetBuilder = Callable[..., RoadMap]
+
+# A main road from west to east, a side road from the south.
+NODES = """
+<node id="w" x="-200" y="0"/><node id="e" x="200" y="0"/><node id="s" x="0" y="-200"/>
+<node id="x" x="0" y="0" type="{}"/>"""
+EDGES = """
+<edge id="wx" from="w" to="x" priority="3"/><edge id="xe" from="x" to="e" priority="3"/>
+<edge id="ex" from="e" to="x" priority="3"/><edge id="xw" from="x" to="w" priority="3"/>
+<edge id="sx" from="s" to="x" priority="1"/><edge id="xs" from="x" to="s" priority="1"/>"""
+
+
+def first_line(roadmap: RoadMap, before: str, after: str) -> StopLine:
+    return roadmap.route([before, after], f"{before}_0", 10.0, None, 100.0).stop_lines[0]
+
+
+def tee(plain: NetBuilder, kind: str) -> RoadMap:
+    return plain(NODES.format(kind), EDGES)
+
+
+def approaches(lanes: frozenset[str]) -> set[str]:
+    return {lane for lane in lanes if not lane.startswith(":")}
+
+
+def test_main_road_has_priority(plain: NetBuilder) -> None:
+    line = first_line(tee(plain, "priority"), "wx", "xe")
+    assert line.control is Control.PRIORITY
+    assert line.signal_id is None
+    assert line.yields_to == frozenset()
+    assert approaches(line.crosses) == {"sx_0", "ex_0"}
+
+
+def test_side_road_yields_to_both_directions_when_turning_left(plain: NetBuilder) -> None:
+    roadmap = tee(plain, "priority")
+    line = first_line(roadmap, "sx", "xw")
+    assert line.control is Control.YIELD
+    assert approaches(line.yields_to) == {"wx_0", "ex_0"}
+    assert all(roadmap.lanes[lane].is_internal for lane in line.yields_to - {"wx_0", "ex_0"})
+    assert line.yields_to <= line.crosses
+
+
+def test_side_road_yields_only_to_the_lane_it_joins_when_turning_right(plain: NetBuilder) -> None:
+    assert approaches(first_line(tee(plain, "priority"), "sx", "xe").yields_to) == {"wx_0"}
+
+
+def test_left_turn_off_the_main_road_yields_to_oncoming_traffic(plain: NetBuilder) -> None:
+    line = first_line(tee(plain, "priority"), "ex", "xs")
+    assert line.control is Control.YIELD
+    assert approaches(line.yields_to) == {"wx_0"}
+
+
+def test_internal_lanes_of_a_waiting_left_turn_are_all_foes(plain: NetBuilder) -> None:
+    roadmap = tee(plain, "priority")
+    route = roadmap.route(["ex", "xs"], "ex_0", 10.0, None, 100.0)
+    turning = {lane for lane in route.lane_ids if lane.startswith(":")}
+    assert len(turning) == 2
+    assert turning <= first_line(roadmap, "wx", "xe").crosses
+
+
+@pytest.mark.parametrize(
+    ("kind", "control"),
+    [
+        ("priority_stop", Control.STOP),
+        ("allway_stop", Control.ALL_WAY_STOP),
+        ("right_before_left", Control.RIGHT_BEFORE_LEFT),
+        ("zipper", Control.YIELD),
+        ("unregulated", Control.PRIORITY),
+    ],
+)
+def test_sign_at_the_side_road(plain: NetBuilder, kind: str, control: Control) -> None:
+    assert first_line(tee(plain, kind), "sx", "xw").control is control
+
+
+def test_right_before_left(plain: NetBuilder) -> None:
+    line = first_line(tee(plain, "right_before_left"), "wx", "xe")
+    assert line.control is Control.RIGHT_BEFORE_LEFT
+    assert approaches(line.yields_to) == {"sx_0"}
+
+
+def test_all_way_stop_lists_everyone_it_meets(plain: NetBuilder) -> None:
+    line = first_line(tee(plain, "allway_stop"), "wx", "xe")
+    assert line.control is Control.ALL_WAY_STOP
+    assert line.yields_to == line.crosses != frozenset()
+
+
+def test_signal_is_named_and_keeps_the_priorities_of_permissive_green(plain: NetBuilder) -> None:
+    roadmap = tee(plain, "traffic_light")
+    left, straight = first_line(roadmap, "ex", "xs"), first_line(roadmap, "wx", "xe")
+    assert left.control is straight.control is Control.SIGNAL
+    assert left.signal_id != straight.signal_id
+    assert str(left.signal_id).startswith("x/")
+    assert approaches(left.yields_to) == {"wx_0"}
+    assert straight.yields_to == frozenset()
+
+
+def test_stop_line_lies_at_the_end_of_its_lane(plain: NetBuilder) -> None:
+    roadmap = tee(plain, "priority")
+    route = roadmap.route(["wx", "xe"], "wx_0", 10.0, None, 100.0)
+    line = route.stop_lines[0]
+    end = roadmap.lanes["wx_0"].line.points[-1]
+    assert line.lane == "wx_0"
+    assert line.position == pytest.approx(tuple(end))
+    assert route.line.poses([line.station])[0, :2] == pytest.approx(end, abs=0.05)
+    begin = roadmap.lanes["xe_0"].line.points[0]
+    assert route.line.poses([line.exit_station])[0, :2] == pytest.approx(begin, abs=0.05)
+
+
+def test_every_junction_on_the_way_has_its_line(grid: NetBuilder) -> None:
+    route = grid().route(["A0B0", "B0B1", "B1B2"], "A0B0_0", 10.0, None, 20.0)
+    assert [line.lane for line in route.stop_lines[:2]] == ["A0B0_0", "B0B1_0"]
+
+
+def test_signals_are_named_in_a_net_without_internal_lanes(grid: NetBuilder) -> None:
+    line = first_line(grid("--no-internal-links", "-j", "traffic_light"), "A1B1", "B1C1")
+    assert str(line.signal_id).startswith("B1/")
+    assert approaches(line.crosses) == set(line.crosses) != set()
+
+
+def test_crossings_before_and_behind_a_junction_are_passed_in_order(grid: NetBuilder) -> None:
+    roadmap = grid("--sidewalks.guess", "--crossings.guess")
+    route = roadmap.route(["A1B1", "B1C1"], "A1B1_1", 10.0, None, 100.0)
+    passed = route.crossings[:2]
+    line = route.stop_lines[0]
+    assert line.station - 1.0 < passed[0].start_station < passed[1].start_station < line.exit_station + 1.0
+    for crossing in passed:
+        lane = roadmap.lanes[crossing.lane]
+        assert crossing.end_station - crossing.start_station == pytest.approx(lane.width, abs=0.3)
+        middle = 0.5 * (crossing.start_station + crossing.end_station)
+        _, offsets = lane.line.project(route.line.poses([middle])[:, :2])
+        assert np.abs(offsets).max() < 0.2
+
+
+def test_pedestrians_with_priority_are_yielded_to(grid: NetBuilder) -> None:
+    roadmap = grid("--sidewalks.guess", "--crossings.guess")
+    route = roadmap.route(["A1B1", "B1C1"], "A1B1_1", 10.0, None, 100.0)
+    assert {crossing.lane for crossing in route.crossings[:2]} <= route.stop_lines[0].crosses
+
+
+def test_no_crossings_without_sidewalks(grid: NetBuilder) -> None:
+    assert grid().route(["A1B1", "B1C1"], "A1B1_0", 10.0, None, 100.0).crossings == ()
