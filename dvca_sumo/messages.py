@@ -136,9 +136,7 @@ class PoseStep(msgspec.Struct, frozen=True, gc=False):
     forward: float  # [m]
     left: float  # [m]
     turn: float  # [rad]
-    speed: float  # [m/s] afterwards
-    acceleration: float  # [m/s^2]
-    curvature: float  # [1/m] afterwards
+    acceleration: float  # [m/s^2] of the trajectory; speed and yaw rate follow from the motion
 
 
 class ControlCommand(msgspec.Struct, frozen=True, gc=False):

@@ -14,6 +14,7 @@ class Thresholds(msgspec.Struct, frozen=True):
     safe_distance: float = 0.2  # [m] closer than this to anything while moving is a violation; 0: contact only
     standing_speed: float = 0.1  # [m/s] at or below it the ego stands
     ttc: float = 0.5  # [s] a contact nearer than this at constant velocities is a violation
+    ttc_dwell: float = 0.2  # [s] for so long without a break: two cars that pass in a bend are no hazard
     ttc_speed: float = 1.0  # [m/s] a slower ego's time to collision is not judged
 
     # traffic rules

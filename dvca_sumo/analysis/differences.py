@@ -168,18 +168,16 @@ def _of_future(name: str, said: PredictedObjects, own: Integers, known: str, occ
 def _of_command(said: ControlCommand, occasion: Occasion) -> list[Difference]:
     wanted = SUBSTITUTES[Component.CONTROL](occasion)
     assert isinstance(wanted, ControlCommand)
-    assert wanted.exact is not None  # ideal control always sets it
-    steering = math.atan(occasion.moment.shape.wheelbase * wanted.exact.curvature)
     return [
         Difference(
             "acceleration",
-            f"{said.acceleration:+.1f} m/s^2; the trajectory has {wanted.exact.acceleration:+.1f} m/s^2",
-            abs(said.acceleration - wanted.exact.acceleration),
+            f"{said.acceleration:+.1f} m/s^2; the trajectory has {wanted.acceleration:+.1f} m/s^2",
+            abs(said.acceleration - wanted.acceleration),
         ),
         Difference(
             "steering",
-            f"{said.steering:+.3f} rad; the trajectory has {steering:+.3f} rad",
-            20.0 * abs(said.steering - steering),
+            f"{said.steering:+.3f} rad; the trajectory has {wanted.steering:+.3f} rad",
+            20.0 * abs(said.steering - wanted.steering),
         ),
     ]
 

@@ -18,7 +18,7 @@ Flags = npt.NDArray[np.bool_]
 
 
 class TimeToCollision:
-    """Kind "ttc": a contact nearer than the threshold; one for each object.
+    """Kind "ttc": a contact nearer than the threshold for the dwell time; one for each object.
 
     The smaller of two times counts: straight on, when the moving boxes first touch (any object, any
     direction); along the route, the gap to an object in the ego's strip over the closing speed, which
@@ -33,20 +33,25 @@ class TimeToCollision:
         self._places = places
         self._horizon = thresholds.ttc
         self._slowest = thresholds.ttc_speed
+        self._dwell = thresholds.ttc_dwell
+        self._since: dict[str, float] = {}  # [s] by object id, of each contact that is near now
         self._reported: set[str] = set()
 
     def observe(self, moment: Moment) -> Violation | None:
         """See `Oracle`."""
         self._places.at(moment)
         if abs(moment.ego.speed) < self._slowest:
+            self._since = {}
             return self._findings.next()
         rows, times = self.times(moment)
-        for row, time in zip(rows.tolist(), times.tolist(), strict=True):
-            name = moment.objects.ids[row]
-            if 0.0 < time < self._horizon and name not in self._reported:
+        soon = {moment.objects.ids[row]: time for row, time in zip(rows.tolist(), times.tolist(), strict=True)}
+        since = {name: self._since.get(name, moment.time) for name, time in soon.items() if 0.0 < time < self._horizon}
+        for name, begun in since.items():
+            if moment.time - begun >= self._dwell - 1e-9 and name not in self._reported:
                 self._reported.add(name)
-                detail = f"{time:.2f} s to contact with {name}"
-                self._findings.add(self._findings.made(moment, detail, time, self._horizon, counterpart=name))
+                detail = f"{soon[name]:.2f} s to contact with {name}"
+                self._findings.add(self._findings.made(moment, detail, soon[name], self._horizon, counterpart=name))
+        self._since = since
         return self._findings.next()
 
     def conclude(self, ended: Ending) -> Judgement:  # noqa: ARG002  the answer holds for whatever part was seen

@@ -64,7 +64,8 @@ def _relaxed(points: Floats, original: Floats, limit: float) -> Floats:
     offsets = _boxed(operator, (bending @ line).T.ravel(), low, high)
     moves = offsets[:, None] * normals
     every = np.arange(len(points))
-    return points + np.column_stack([np.interp(every, nodes, moves[:, axis]) for axis in (0, 1)])
+    moved: Floats = points + np.column_stack([np.interp(every, nodes, moves[:, axis]) for axis in (0, 1)])
+    return moved
 
 
 def _boxed(operator: Floats, target: Floats, low: Floats, high: Floats) -> Floats:

@@ -20,7 +20,6 @@ from dvca_sumo.messages import (
     CURVATURE,
     HEADING,
     PREDICTION_TIMES,
-    SPEED,
     T,
     X,
     Y,
@@ -36,9 +35,9 @@ from dvca_sumo.messages import (
 )
 
 CONTROL_STEP = 0.01  # [s]
-# A substitute that takes over beside the trajectory closes the gap like a vehicle, not by a jump.
-_CLOSING_SPEED = 0.5  # [m/s]
-_CLOSING_TURN = 0.3  # [rad/s]
+# A substitute that takes over beside the trajectory closes the gap like a vehicle, on its way, not by a jump.
+_CLOSING = 0.05  # [m] at most for each metre driven
+_CLOSING_TURN = 0.03  # [rad] likewise
 _LOST_BRAKING = 3.0  # [m/s^2] without any trajectory left to follow
 
 
@@ -82,29 +81,28 @@ def ideal_control(occasion: Occasion) -> ControlCommand:
     """The ego moves exactly as the current trajectory says (Apollo's sim-control).
 
     The planned motion over the next control step is applied in the ego's own frame; what the ego is
-    beside the trajectory, by its own belief, is closed at a limited speed.
+    beside the trajectory, by its own belief, is closed gradually.
     """
     time = occasion.moment.time
     speed = occasion.moment.ego.speed
     trajectory = occasion.trajectory
     if trajectory is None or time + CONTROL_STEP > trajectory.time + trajectory.points[-1, T]:
         slower = max(0.0, speed - _LOST_BRAKING * CONTROL_STEP)
-        step = PoseStep(0.5 * (speed + slower) * CONTROL_STEP, 0.0, 0.0, slower, (slower - speed) / CONTROL_STEP, 0.0)
-        return ControlCommand(time, step.acceleration, 0.0, step)
+        braking = (slower - speed) / CONTROL_STEP
+        return ControlCommand(time, braking, 0.0, PoseStep(slower * CONTROL_STEP, 0.0, 0.0, braking))
     here = _row_at(trajectory, time)
     there = _row_at(trajectory, time + CONTROL_STEP)
     gap = relative(_pose(here), believed_pose(occasion))
-    motion = relative(_pose(there), _pose(here))
-    nearer, turned = _CLOSING_SPEED * CONTROL_STEP, _CLOSING_TURN * CONTROL_STEP
+    ahead, left, turn = relative(_pose(there), _pose(here))
+    nearer, turned = _CLOSING * abs(ahead), _CLOSING_TURN * abs(ahead)
     step = PoseStep(
-        forward=motion[0] + _clipped(gap[0], nearer),
-        left=motion[1] + _clipped(gap[1], nearer),
-        turn=wrapped(motion[2]) + _clipped(wrapped(gap[2]), turned),
-        speed=float(there[SPEED]),
+        forward=ahead + _clipped(gap[0], nearer),
+        left=left + _clipped(gap[1], nearer),
+        turn=wrapped(turn) + _clipped(wrapped(gap[2]), turned),
         acceleration=float(there[ACCELERATION]),
-        curvature=float(there[CURVATURE]),
     )
-    return ControlCommand(time, step.acceleration, 0.0, step)
+    curvature = float(there[CURVATURE])
+    return ControlCommand(time, step.acceleration, math.atan(occasion.moment.shape.wheelbase * curvature), step)
 
 
 SUBSTITUTES: dict[Component, Callable[[Occasion], Message]] = {

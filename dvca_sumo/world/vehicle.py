@@ -100,18 +100,19 @@ class Vehicle:
         return self._drive + (target - self._drive) * (1.0 - math.exp(-dt / limits.acceleration_lag))
 
     def _moved_exactly(self, step: PoseStep, dt: float) -> EgoTruth:
-        if not math.isfinite(step.forward + step.left + step.turn + step.speed + step.acceleration + step.curvature):
+        if not math.isfinite(step.forward + step.left + step.turn + step.acceleration):
             raise ControlCommandError(f"exact control command: every number must be finite, got {step}")
-        before = self._truth
+        before, most = self._truth, self._limits.max_steering
         cos, sin = math.cos(before.heading), math.sin(before.heading)
+        steering = math.atan2(self._wheelbase * step.turn, step.forward) if step.forward > 0.0 else before.steering
         self._drive = step.acceleration
         return EgoTruth(
             time=round(before.time + dt, 9),
             x=before.x + step.forward * cos - step.left * sin,
             y=before.y + step.forward * sin + step.left * cos,
             heading=wrapped(before.heading + step.turn),
-            speed=step.speed,
+            speed=max(0.0, step.forward / dt),
             acceleration=step.acceleration,
-            yaw_rate=step.speed * step.curvature,
-            steering=math.atan(self._wheelbase * step.curvature),
+            yaw_rate=step.turn / dt,
+            steering=min(most, max(-most, steering)),
         )

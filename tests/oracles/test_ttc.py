@@ -7,14 +7,17 @@ from oracle_scenes import FRONT, Row, car, drive, judged, moment, moment_at, roa
 from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.oracles.ttc import TimeToCollision
 from dvca_sumo.thresholds import Thresholds
+from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Answer
+
+AT_ONCE = Thresholds(ttc_dwell=0.0)
 
 
 def test_closing_in_on_a_standing_car_too_fast_is_a_violation() -> None:
     found = judged(TimeToCollision, drive(40.0, 49.5, 10.0, objects=[car("lead", 50.0)]))
     (violation,) = found.violations
     assert (violation.kind, violation.object) == ("ttc", "lead")
-    assert violation.value == pytest.approx(0.4)
+    assert violation.value == pytest.approx(0.2)
     assert violation.threshold == 0.5
 
 
@@ -23,6 +26,18 @@ def test_closing_in_just_slowly_enough_is_fine() -> None:
     assert judged(TimeToCollision, moments).answer is Answer.KEPT
     moments = [moment(0.1 * k, 45.0, 10.0, objects=[car("lead", 49.999, speed=0.0)]) for k in range(5)]
     assert judged(TimeToCollision, moments).answer is Answer.VIOLATED
+
+
+def test_a_contact_that_is_near_for_a_moment_only_is_fine() -> None:
+    def passing(moments: int) -> list[Moment]:
+        """Two cars in a bend that point at each other for so many moments."""
+        return [
+            moment(0.1 * k, 50.0, 10.0, objects=[car("oncoming", 54.0, y=0.0 if k < moments else 3.0)])
+            for k in range(5)
+        ]
+
+    assert judged(TimeToCollision, passing(2)).answer is Answer.KEPT
+    assert judged(TimeToCollision, passing(3)).answer is Answer.VIOLATED
 
 
 def test_a_small_gap_at_equal_speed_is_fine() -> None:
@@ -34,18 +49,23 @@ def test_a_small_gap_at_equal_speed_is_fine() -> None:
 def test_crossing_traffic_counts_when_both_are_there_at_once(cross_speed: float, expected: Answer) -> None:
     # The crossing box covers the ego's strip at y in +-0.9 while the ego's front is 4 m away from it.
     crossing: Row = ("cross", (55.0, -0.9 - 2.0 - 1.5, math.pi / 2.0, 4.0, 2.0), (0.0, cross_speed))
-    assert judged(TimeToCollision, [moment(0.0, 50.0, 10.0, objects=[crossing])]).answer is expected
+    assert judged(TimeToCollision, [moment(0.0, 50.0, 10.0, objects=[crossing])], thresholds=AT_ONCE).answer is expected
 
 
 def test_oncoming_traffic_in_its_own_lane_is_fine_and_in_ours_is_not() -> None:
     for y, expected in ((3.2, Answer.KEPT), (0.5, Answer.VIOLATED)):
         oncoming: Row = ("oncoming", (58.0, y, math.pi, 4.6, 1.8), (-10.0, 0.0))
-        assert judged(TimeToCollision, [moment(0.0, 50.0, 10.0, objects=[oncoming])]).answer is expected
+        assert (
+            judged(TimeToCollision, [moment(0.0, 50.0, 10.0, objects=[oncoming])], thresholds=AT_ONCE).answer
+            is expected
+        )
 
 
 def test_a_follower_that_closes_in_is_its_own_hazard() -> None:
     follower = car("late", 50.0 - 4.6 - 6.0, speed=20.0)
-    assert judged(TimeToCollision, [moment(0.0, 50.0, 10.0, objects=[follower])]).answer is Answer.KEPT
+    assert (
+        judged(TimeToCollision, [moment(0.0, 50.0, 10.0, objects=[follower])], thresholds=AT_ONCE).answer is Answer.KEPT
+    )
 
 
 def test_a_standing_ego_is_not_judged() -> None:
@@ -54,7 +74,10 @@ def test_a_standing_ego_is_not_judged() -> None:
 
 
 def test_a_contact_is_no_longer_a_time_to_collision() -> None:
-    assert judged(TimeToCollision, [moment(0.0, 50.0, 10.0, objects=[car("hit", 49.0)])]).answer is Answer.KEPT
+    assert (
+        judged(TimeToCollision, [moment(0.0, 50.0, 10.0, objects=[car("hit", 49.0)])], thresholds=AT_ONCE).answer
+        is Answer.KEPT
+    )
 
 
 def test_a_leader_round_the_bend_is_found_along_the_route() -> None:
@@ -66,7 +89,7 @@ def test_a_leader_round_the_bend_is_found_along_the_route() -> None:
     x = radius * math.sin(front) - FRONT * math.cos(front)
     y = radius * (1.0 - math.cos(front)) - FRONT * math.sin(front)
     seen = moment_at(0.0, x, y, front, speed=12.0, objects=[leader])
-    (violation,) = judged(TimeToCollision, [seen], route).violations
+    (violation,) = judged(TimeToCollision, [seen], route, thresholds=AT_ONCE).violations
     assert violation.value == pytest.approx((6.0 - 0.25) / 12.0, abs=0.03)
 
 
@@ -78,8 +101,8 @@ def test_each_object_is_reported_once() -> None:
 
 def test_the_threshold_is_a_parameter() -> None:
     moments = [moment(0.0, 30.0, 10.0, objects=[car("lead", 50.0)])]
-    assert judged(TimeToCollision, moments, thresholds=Thresholds(ttc=2.1)).answer is Answer.VIOLATED
-    assert judged(TimeToCollision, moments, thresholds=Thresholds(ttc=1.9)).answer is Answer.KEPT
+    assert judged(TimeToCollision, moments, thresholds=Thresholds(ttc=2.1, ttc_dwell=0.0)).answer is Answer.VIOLATED
+    assert judged(TimeToCollision, moments, thresholds=Thresholds(ttc=1.9, ttc_dwell=0.0)).answer is Answer.KEPT
 
 
 def test_nothing_is_known_of_a_run_without_moments() -> None:

@@ -114,7 +114,9 @@ def test_missing_net_is_named(tmp_path: Path) -> None:
         RoadMap.load(tmp_path / "nowhere.net.xml")
 
 
-@pytest.mark.parametrize("text", ["no xml at all", "<net/>", "<routes><vehicle id='x'/></routes>", '<net version="1.20">'])
+@pytest.mark.parametrize(
+    "text", ["no xml at all", "<net/>", "<routes><vehicle id='x'/></routes>", '<net version="1.20">']
+)
 def test_file_that_is_no_net_is_named(tmp_path: Path, text: str) -> None:
     path = tmp_path / "odd.net.xml"
     path.write_text(text)

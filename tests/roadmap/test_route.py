@@ -2,8 +2,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from soundness import check_sound
 
-from dvca_sumo.geometry.polyline import Floats
 from dvca_sumo.roadmap import RoadMap, Route
 
 NetBuilder = Callable[..., RoadMap]
@@ -14,28 +14,8 @@ THREE_LANES = '<edge id="e" from="a" to="b" numLanes="3" speed="13.89"/>'
 AROUND_AND_ON = ["A1B1", "B1B0", "B0A0", "A0A1", "A1B1", "B1C1"]  # four right turns, then straight over B1
 
 
-def offsets_from(route: Route, roadmap: RoadMap, lane: str, rows: Floats) -> Floats:
-    return roadmap.lanes[lane].line.project(route.line.points[rows])[1]
-
-
-def check_sound(route: Route) -> None:
-    """What holds of every route, whatever the net."""
-    steps = np.diff(route.line.stations)
-    assert steps[:-1] == pytest.approx(1.0)
-    assert 0.2 < steps[-1] < 1.4
-    assert np.isfinite(route.line.points).all()
-    assert len(route.lane_ids) == len(route.line.points)
-    for array in (route.lane_left, route.lane_right, route.road_left, route.road_right, route.speed_limits):
-        assert len(array) == len(route.line.points)
-        assert not array.flags.writeable
-    assert (route.road_left >= route.lane_left).all()
-    assert (route.lane_left > 0.0).all()
-    assert (route.lane_right < 0.0).all()
-    assert (route.road_right <= route.lane_right).all()
-    assert 0.0 < route.start <= route.destination <= route.line.length + 1e-6
-    stations = [line.station for line in route.stop_lines]
-    assert stations == sorted(stations)
-    assert all(line.station <= line.exit_station for line in route.stop_lines)
+def widest_offset(route: Route, roadmap: RoadMap, lane: str, rows: slice) -> float:
+    return float(np.abs(roadmap.lanes[lane].line.project(route.line.points[rows])[1]).max())
 
 
 def test_straight_lane_is_followed_in_its_middle(plain: NetBuilder) -> None:
@@ -89,6 +69,16 @@ def test_turn_at_a_junction_can_be_driven(grid: NetBuilder) -> None:
     assert any(lane.startswith(":B0_") for lane in route.lane_ids)
 
 
+def test_corner_too_tight_for_a_car_is_drawn_wider_but_within_the_lane(grid: NetBuilder) -> None:
+    roadmap = grid()
+    route = roadmap.route(["B0A0", "A0A1"], "B0A0_0", 30.0, None, 100.0)
+    check_sound(route)
+    assert np.abs(route.curvatures).max() < 0.45  # 0.67 in the net
+    lanes = [roadmap.lanes[lane].line for lane in dict.fromkeys(route.lane_ids)]
+    away = np.min([np.abs(line.project(route.line.points)[1]) for line in lanes], axis=0)
+    assert 0.3 < away.max() < 0.7
+
+
 def test_speed_limit_is_that_of_the_lane(grid: NetBuilder) -> None:
     roadmap = grid()
     route = roadmap.route(["A0B0", "B0B1"], "A0B0_0", 5.0, None, 100.0)
@@ -137,16 +127,16 @@ def test_lane_change_is_blended_early_and_gently(plain: NetBuilder) -> None:
     crossed = np.flatnonzero(np.array(route.lane_ids) == "e_1")[0]
     assert 20.0 < crossed - route.start < 45.0
     assert np.abs(route.curvatures).max() < 0.02
-    assert np.abs(offsets_from(route, roadmap, "e_0", np.arange(int(route.start)))).max() < 0.05
-    assert np.abs(offsets_from(route, roadmap, "e_1", np.arange(int(route.start) + 60, 300))).max() < 0.05
+    assert widest_offset(route, roadmap, "e_0", slice(int(route.start))) < 0.05
+    assert widest_offset(route, roadmap, "e_1", slice(int(route.start) + 60, 300)) < 0.05
 
 
 def test_both_lanes_count_during_a_lane_change(plain: NetBuilder) -> None:
     route = plain(LONG_ROAD, THREE_LANES).route(["e"], "e_0", 50.0, "e_1", 400.0)
     crossed = next(row for row, lane in enumerate(route.lane_ids) if lane == "e_1")
-    assert route.lane_left[crossed] - route.lane_right[crossed] == pytest.approx(6.4, abs=0.01)
+    assert route.lane_left[crossed] - route.lane_right[crossed] == pytest.approx(6.4, abs=0.05)
     assert route.lane_left[crossed + 60] - route.lane_right[crossed + 60] == pytest.approx(3.2, abs=0.01)
-    assert route.road_left[crossed] - route.road_right[crossed] == pytest.approx(9.6, abs=0.01)
+    assert route.road_left[crossed] - route.road_right[crossed] == pytest.approx(9.6, abs=0.05)
 
 
 def test_change_over_two_lanes_passes_the_one_between(plain: NetBuilder) -> None:
@@ -160,6 +150,13 @@ def test_short_edge_squeezes_the_lane_change_into_itself(plain: NetBuilder) -> N
     check_sound(route)
     assert route.lane_ids[int(route.destination)] == "e_1"
     assert abs(route.line.project([[490.0, 0.0]])[0][0] - route.destination) < 1.0
+
+
+def test_route_to_where_the_ego_stands_is_short_but_sound(plain: NetBuilder) -> None:
+    roadmap = plain(LONG_ROAD, THREE_LANES)
+    route = roadmap.route(["e"], "e_0", 500.0, None, 500.0)
+    check_sound(route)
+    assert route.destination == pytest.approx(route.start) == route.line.length
 
 
 def test_overlapping_lanes_make_no_step_back(plain: NetBuilder) -> None:

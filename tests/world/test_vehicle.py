@@ -71,17 +71,17 @@ def test_standing_without_acceleration_nothing_moves_but_time() -> None:
 
 def test_an_exact_step_is_made_exactly_in_the_frame_before_it() -> None:
     vehicle = Vehicle(SHAPE, LIMITS, EgoTruth(3.0, 10.0, 20.0, math.pi / 2, 8.0, 0.0, 0.0, 0.0))
-    step = PoseStep(forward=1.0, left=0.5, turn=math.pi, speed=9.0, acceleration=-7.0, curvature=0.1)
+    step = PoseStep(forward=1.0, left=0.5, turn=math.pi, acceleration=-7.0)
     truth = vehicle.advance(ControlCommand(3.0, 2.0, 0.5, step), 0.1)
     assert (truth.x, truth.y, truth.time) == pytest.approx((9.5, 21.0, 3.1))
     assert truth.heading == pytest.approx(-math.pi / 2)
-    assert (truth.speed, truth.acceleration, truth.yaw_rate) == pytest.approx((9.0, -7.0, 0.9))
-    assert truth.steering == pytest.approx(math.atan(SHAPE.wheelbase * 0.1))
+    assert (truth.speed, truth.acceleration, truth.yaw_rate) == pytest.approx((10.0, -7.0, 10.0 * math.pi))
+    assert truth.steering == LIMITS.max_steering
 
 
 def test_after_an_exact_step_the_actuators_go_on_from_it() -> None:
     vehicle = standing_or_rolling(speed=8.0)
-    vehicle.advance(ControlCommand(0.0, 0.0, 0.0, PoseStep(0.08, 0.0, 0.0, 8.0, -2.0, 0.05)), 0.01)
+    vehicle.advance(ControlCommand(0.0, 0.0, 0.0, PoseStep(0.08, 0.0, 0.004, -2.0)), 0.01)
     truth = driven(vehicle, -2.0, math.atan(SHAPE.wheelbase * 0.05), 1)
     assert truth.acceleration == pytest.approx(-2.0)
     assert truth.yaw_rate == pytest.approx(truth.speed * 0.05)
@@ -92,7 +92,7 @@ def test_after_an_exact_step_the_actuators_go_on_from_it() -> None:
     [
         ControlCommand(1.0, math.nan, 0.0),
         ControlCommand(1.0, 0.0, math.inf),
-        ControlCommand(1.0, 0.0, 0.0, PoseStep(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0)),
+        ControlCommand(1.0, 0.0, 0.0, PoseStep(math.nan, 0.0, 0.0, 0.0)),
     ],
 )
 def test_a_command_that_is_not_finite_is_refused_and_changes_nothing(command: ControlCommand) -> None:

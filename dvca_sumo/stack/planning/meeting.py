@@ -1,19 +1,21 @@
 """Whose turn it is where the ways of the ego and of somebody else meet: pass before, or yield."""
 
+import math
 from collections.abc import Iterable
 
 import msgspec
 import numpy as np
 
-from dvca_sumo.messages import Floats, ObjectClass, VehicleShape
+from dvca_sumo.messages import ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView, has_priority
-from dvca_sumo.stack.planning.scene import Scene
+from dvca_sumo.stack.planning.scene import Flags, Scene
 from dvca_sumo.stack.planning.speed import STEP_TIMES, Profile, Stop
-from dvca_sumo.stack.planning.st_graph import ALONG, Graph
+from dvca_sumo.stack.planning.st_graph import ALONG, PRESENT, Graph
 
-_PRESENT = 0.3  # [s] what occupies the path within this time is there already
+_PERSON = int(ObjectClass.PEDESTRIAN)
 _CUTS_IN = 0.5  # [m] moved sideways before the meeting: the other comes into our lane, not we into theirs
+_STAYS = 2  # columns of the graph, after which somebody is on the path to drive along it
 _HARD_GAP = 0.5  # [m] to the other's way, defended by hard braking
 _CLEAR_GAP = 0.5  # [m] lengthwise behind somebody who has passed
 _AT_LINE = 0.5  # [m] past the stop line the ego may still wait at it
@@ -39,56 +41,68 @@ class Meetings:
         """End a cycle in which the ego passes in front of the tracks `passing`."""
         self._passing = frozenset(passing)
 
-    def demand(
-        self, row: int, graph: Graph, scene: Scene, views: list[LineView], station: float, profile: Profile
-    ) -> Demand | None:
-        """What future `row` asks of an ego that would otherwise drive `profile`; None when nothing.
+    def demands(
+        self, rows: list[int], graph: Graph, scene: Scene, views: list[LineView], station: float, profile: Profile
+    ) -> list[Demand]:
+        """What the futures `rows` ask of an ego that would otherwise drive `profile`.
 
         `station` is the window's origin on the route [m].
         """
-        first, config = graph.first[row], self._config
-        entry = float(scene.times[first])
+        if not rows:
+            return []
+        settled = self._comes_after(rows, graph, scene, profile)
+        settled |= self._passes(rows, graph, scene, profile, self._config.pass_margin)
+        found = (
+            self._demand(row, graph, scene, views, station, profile)
+            for row, is_settled in zip(rows, settled.tolist(), strict=True)
+            if not is_settled
+        )
+        return [demand for demand in found if demand is not None]
+
+    def _demand(
+        self, row: int, graph: Graph, scene: Scene, views: list[LineView], station: float, profile: Profile
+    ) -> Demand | None:
+        config, owner = self._config, int(scene.owners[row])
+        entry = float(scene.times[graph.first[row]])
         others_first = self._others_first(row, graph, scene, views, station)
         if others_first is False:
             if self._cuts_in(row, graph, scene):
                 return self._cut_in(row, graph, scene, profile)
-            speed = float(scene.speeds[scene.owners[row]])
-            if entry > _PRESENT and speed / (2.0 * entry) < config.expected_braking:
+            if entry > PRESENT and scene.speeds[owner] / (2.0 * entry) < config.expected_braking:
                 return None
         margin = config.pass_margin if others_first else config.pass_margin_prior
-        if scene.ids[scene.owners[row]] in self._passing:
+        if scene.ids[owner] in self._passing:
             margin -= config.pass_hold
-        if self.passes(row, graph, scene, profile, margin) or self._comes_after(row, graph, scene, profile):
+        if margin < config.pass_margin and self._passes([row], graph, scene, profile, margin)[0]:
             return None
         stop = self._stop(row, graph, scene, views)
         room = stop.at + stop.give
         if room <= 0.0:  # beside the ego already, or nearly: stopping there would not help
             return None
-        if profile.speeds[0] ** 2 / (2.0 * room) > config.hard_braking and self.passes(row, graph, scene, profile, 0.0):
+        is_too_late = profile.speeds[0] ** 2 / (2.0 * room) > config.hard_braking
+        if is_too_late and self._passes([row], graph, scene, profile, 0.0)[0]:
             return None
         return Demand(row, stop, follows=self._joins(row, graph, scene))
 
-    def passes(self, row: int, graph: Graph, scene: Scene, profile: Profile, margin: float) -> bool:
-        """Whether the ego has left every place that future `row` occupies `margin` [s] before it comes there."""
-        columns = np.flatnonzero(graph.occupied[row])
-        rear = np.interp(scene.times[columns] - margin, STEP_TIMES, profile.arcs) - self._shape.rear_overhang
-        return bool((rear > graph.high[row, columns]).all())
+    def _passes(self, rows: list[int], graph: Graph, scene: Scene, profile: Profile, margin: float) -> Flags:
+        """Whether the ego has left every place that a future occupies `margin` [s] before it comes there."""
+        rear = np.interp(scene.times - margin, STEP_TIMES, profile.arcs) - self._shape.rear_overhang
+        passes: Flags = np.all((rear > graph.high[rows]) | ~graph.occupied[rows], axis=1)
+        return passes
 
-    def _comes_after(self, row: int, graph: Graph, scene: Scene, profile: Profile) -> bool:
-        columns = np.flatnonzero(graph.occupied[row])
-        times: Floats = scene.times[columns] + self._config.clear_margin
-        front = np.interp(times, STEP_TIMES, profile.arcs) + self._shape.front
-        return bool((front < graph.low[row, columns] - _CLEAR_GAP).all())
+    def _comes_after(self, rows: list[int], graph: Graph, scene: Scene, profile: Profile) -> Flags:
+        """Whether the ego comes to every place that a future occupies after that has gone."""
+        times = scene.times + self._config.clear_margin
+        front = np.interp(times, STEP_TIMES, profile.arcs) + (self._shape.front + _CLEAR_GAP)
+        after: Flags = np.all((front < graph.low[rows]) | ~graph.occupied[rows], axis=1)
+        return after
 
-    def _others_first(self, row: int, graph: Graph, scene: Scene, views: list[LineView], station: float) -> bool | None:
+    def _others_first(self, row: int, graph: Graph, scene: Scene, views: list[LineView], station: float) -> bool:
         """Whether the other has priority. People have; on junctions the map tells; who leaves its lane has not."""
-        if scene.classes[scene.owners[row]] == ObjectClass.PEDESTRIAN:
+        if scene.classes[scene.owners[row]] == _PERSON:
             return True
-        first = graph.first[row]
-        told = has_priority(views, station + float(graph.low[row, first]), scene.lanes[row])
-        if told is not None:
-            return told
-        return not self._cuts_in(row, graph, scene)
+        told = has_priority(views, station + float(graph.low[row, graph.first[row]]), scene.lanes[row])
+        return told if told is not None else not self._cuts_in(row, graph, scene)
 
     def _cuts_in(self, row: int, graph: Graph, scene: Scene) -> bool:
         futures, first = scene.futures, graph.first[row]
@@ -98,8 +112,7 @@ class Meetings:
     def _cut_in(self, row: int, graph: Graph, scene: Scene, profile: Profile) -> Demand | None:
         """Who cuts in with its nose ahead of ours becomes the leader; who does not has to see to it."""
         first = graph.first[row]
-        entry = float(scene.times[first])
-        front = float(np.interp(entry, STEP_TIMES, profile.arcs)) + self._shape.front
+        front = float(np.interp(scene.times[first], STEP_TIMES, profile.arcs)) + self._shape.front
         if graph.high[row, first] < front:
             return None
         label = f"follow {scene.ids[scene.owners[row]]}"
@@ -107,27 +120,25 @@ class Meetings:
 
     def _joins(self, row: int, graph: Graph, scene: Scene) -> bool:
         """Whether the other drives along the path once it is on it."""
-        directions = scene.futures.directions[row]
-        return bool(directions[graph.last[row]] > ALONG and graph.last[row] > graph.first[row] + 2)
+        first, last = graph.first[row], graph.last[row]
+        return bool(scene.futures.directions[row, last] > ALONG and last > first + _STAYS)
 
     def _stop(self, row: int, graph: Graph, scene: Scene, views: list[LineView]) -> Stop:
         """Before the other's way until it is clear; at the stop line while the ego has not crossed it."""
         config, front = self._config, self._shape.front
         first, last = graph.first[row], graph.last[row]
-        is_person = scene.classes[scene.owners[row]] == ObjectClass.PEDESTRIAN
-        gap = config.person_gap if is_person else config.yield_gap
-        columns = np.flatnonzero(graph.occupied[row])
+        owner = scene.owners[row]
+        gap = config.person_gap if scene.classes[owner] == _PERSON else config.yield_gap
         if self._joins(row, graph, scene):
             nearest, until = float(graph.low[row, first]), float(scene.times[first])
         else:
-            nearest = float(graph.low[row, columns].min())
+            nearest = float(graph.low[row][graph.occupied[row]].min())
             until = float(scene.times[last]) + config.clear_margin
             if last == len(scene.times) - 1:
-                until = float("inf")
+                until = math.inf
         at = nearest - gap - front
         for line, distance, _, _ in views:
-            within = distance - 1.0 <= nearest - front <= distance + line.exit_station - line.station
-            if within and distance > -_AT_LINE:
+            is_within = distance - 1.0 <= nearest - front <= distance + line.exit_station - line.station
+            if is_within and distance > -_AT_LINE:
                 at = min(at, distance - config.stop_line_gap)
-        label = f"yield {scene.ids[scene.owners[row]]}"
-        return Stop(at, max(nearest - _HARD_GAP - front - at, 0.0), label, until)
+        return Stop(at, max(nearest - _HARD_GAP - front - at, 0.0), f"yield {scene.ids[owner]}", until)

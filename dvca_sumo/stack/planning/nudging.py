@@ -159,19 +159,27 @@ class NudgeDecider:
         return self._is_free(offset, band, speed, scene)
 
     def _is_queueing(self, blocker: _Blocker, scene: Scene, views: list[LineView]) -> bool:
-        """A vehicle in our lane near a line or behind another one may just wait, however long it has stood."""
+        """A vehicle in our lane may just wait, however long it has stood: near a line, or behind one that waits."""
         now = scene.now
         is_vehicle = scene.classes != ObjectClass.PEDESTRIAN
         is_vehicle &= scene.classes != ObjectClass.STATIC
         in_lane = is_vehicle & (np.abs(now.offsets) < _IN_LANE)
         if not in_lane[blocker.row]:
             return False
-        for view in views:
-            to_line = view.distance + self._shape.front - blocker.high
-            if to_line < self._config.queue_reach and view.line.exit_station - view.line.station > -to_line:
+        lows, highs = now.stations - now.half_lengths, now.stations + now.half_lengths
+        nose = blocker.high
+        while True:
+            for view in views:
+                to_line = view.distance + self._shape.front - nose
+                if to_line < self._config.queue_reach and view.line.exit_station - view.line.station > -to_line:
+                    return True
+            ahead = np.flatnonzero(in_lane & (lows > nose) & (lows < nose + self._config.queue_gap))
+            if not len(ahead):
+                return False
+            next_ahead = ahead[lows[ahead].argmin()]
+            if not scene.is_standing[next_ahead]:
                 return True
-        gaps = now.stations - now.half_lengths - blocker.high
-        return bool((in_lane & (gaps > 0.0) & (gaps < self._config.queue_gap)).any())
+            nose = float(highs[next_ahead])
 
     def _is_free(self, offset: float, band: tuple[float, float], speed: float, scene: Scene) -> bool:
         """Whether nobody who moves comes alongside while the ego is out of its lane."""

@@ -148,7 +148,8 @@ def _blends(
     return blends
 
 
-def _blend(state: Lateral, target: float, length: float, along: npt.NDArray[np.floating]
+def _blend(
+    state: Lateral, target: float, length: float, along: npt.NDArray[np.floating]
 ) -> tuple[Floats, Floats, Floats]:
     """The quintic of least jerk from `state` to rest at `target` after `length`, at distances `along`."""
     first, second = state.slope * length, 0.5 * state.bend * length * length
@@ -166,16 +167,14 @@ def _blend(state: Lateral, target: float, length: float, along: npt.NDArray[np.f
 
 def _swept(offsets: Floats, slopes: Floats, curvatures: Floats, shape: VehicleShape) -> tuple[Floats, Floats]:
     """Where the sides of the body pass each station: the body is straight and turns about the rear axle."""
-    rows = BEHIND + len(offsets)
-    left, right = np.empty(rows), np.empty(rows)
-    left[:BEHIND] = right[:BEHIND] = offsets[0]
-    left[BEHIND:] = right[BEHIND:] = offsets
-    for ahead in (0.5 * shape.front, shape.front):
-        moved = round(ahead)
-        axis = (offsets + ahead * slopes - (0.5 * ahead * ahead) * curvatures)[:-moved]
-        part = slice(BEHIND + moved, None)
-        np.maximum(left[part], axis, out=left[part])
-        np.minimum(right[part], axis, out=right[part])
-    left += 0.5 * shape.width
-    right -= 0.5 * shape.width
+    left, right = np.empty(BEHIND + len(offsets)), np.empty(BEHIND + len(offsets))
+    half = 0.5 * shape.width
+    left[:BEHIND], right[:BEHIND] = offsets[0] + half, offsets[0] - half
+    halves = half * np.sqrt(1.0 + slopes * slopes)
+    left[BEHIND:], right[BEHIND:] = offsets + halves, offsets - halves
+    for ahead in range(1, math.ceil(shape.front) + 1):
+        axis = offsets + ahead * slopes - (0.5 * ahead * ahead) * curvatures
+        part = slice(BEHIND + ahead, None)
+        np.maximum(left[part], (axis + halves)[:-ahead], out=left[part])
+        np.minimum(right[part], (axis - halves)[:-ahead], out=right[part])
     return left, right

@@ -70,18 +70,18 @@ class Planner:
         """Station and offset on the route, looked for where the ego was before, then anywhere; None off the route."""
         if self._station is not None:
             located = self._reference.locate(start.x, start.y, self._station)
-            if located is not None and self._is_on_route(start, *located):
+            if located is not None and self._is_on_route(start, *located[1:]):
                 self._station = located[0]
                 return located[:2]
         line = self._route.line
         stations, offsets = line.project([[start.x, start.y]])
         station, offset = float(stations[0]), float(offsets[0])
-        if not self._is_on_route(start, station, offset, float(line.headings[int(station)])):
+        if not self._is_on_route(start, offset, float(line.headings[int(station)])):
             return None
         self._station = station
         return station, offset
 
-    def _is_on_route(self, start: StartState, _: float, offset: float, heading: float) -> bool:
+    def _is_on_route(self, start: StartState, offset: float, heading: float) -> bool:
         angle = abs(math.remainder(start.heading - heading, 2.0 * math.pi))
         return abs(offset) <= self._config.off_route and angle <= _LARGEST_ANGLE
 
@@ -122,25 +122,15 @@ class Planner:
         profile = roll_out(start.speed, start.acceleration, caps, stops, leader, self._config)
         demands: dict[int, Demand] = {}
         for _ in range(_ROUNDS):
-            found = [
-                self._meetings.demand(row, graph, scene, views, window.station, profile)
-                for row in others
-                if row not in demands
-            ]
-            new = {demand.row: demand for demand in found if demand is not None}
+            undecided = [row for row in others if row not in demands]
+            new = self._meetings.demands(undecided, graph, scene, views, window.station, profile)
             if not new:
                 break
-            demands.update(new)
-            follow = leaders + [row for row, demand in demands.items() if demand.follows]
-            leader = leader_of(follow, graph, scene, self._shape)
-            profile = roll_out(
-                start.speed,
-                start.acceleration,
-                caps,
-                [*stops, *_merged(demands, scene)],
-                leader,
-                self._config,
-            )
+            demands.update((demand.row, demand) for demand in new)
+            joining = [demand.row for demand in demands.values() if demand.follows]
+            leader = leader_of(leaders + joining, graph, scene, self._shape)
+            stops_now = [*stops, *_merged(demands, scene)]
+            profile = roll_out(start.speed, start.acceleration, caps, stops_now, leader, self._config)
         yielding = {int(scene.owners[row]) for row in demands}
         self._meetings.settle(scene.ids[scene.owners[row]] for row in others if scene.owners[row] not in yielding)
         return profile
@@ -202,9 +192,7 @@ def _passing_speeds(scene: Scene, graph: Graph, config: PlanningConfig) -> list[
     owners, gaps = scene.owners, graph.gaps[:, 0]
     is_person = scene.classes[owners] == _PERSON
     close = (gaps >= 0.0) & (gaps < np.where(is_person, config.person_slow_gap, config.object_slow_gap))
-    close &= scene.is_standing[owners] | (
-        (scene.speeds[owners] < _SLOW_MOVER) & (scene.classes[owners] != _VEHICLE)
-    )
+    close &= scene.is_standing[owners] | ((scene.speeds[owners] < _SLOW_MOVER) & (scene.classes[owners] != _VEHICLE))
     speeds = []
     for row in np.flatnonzero(close).tolist():
         slowest, more = _SLOW_FOR_PERSON if is_person[row] else _SLOW_FOR_OBJECT
@@ -241,6 +229,10 @@ def _points(path: Path, profile: Profile) -> Floats:
         points[:, column] = np.interp(arcs, path.arcs, values)
     points[:, 4] = speeds
     points[:, 5] = accelerations
+    parts = np.interp(arcs, path.arcs, np.arange(len(path.arcs))) % 1.0
+    bulge = 0.5 * points[:, 6] * parts * (1.0 - parts)  # of an arc over its chord; rows of the path are 1 m apart
+    points[:, 1] += bulge * np.sin(points[:, 3])
+    points[:, 2] -= bulge * np.cos(points[:, 3])
     return points
 
 

@@ -69,7 +69,7 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         missed = ahead - step * scale
         offsets = across - 0.5 * turn * step
         offsets = np.where(np.abs(missed) > 1.0, np.copysign(np.hypot(missed, offsets), offsets), offsets)
-        return nearest - BEHIND + step, offsets, headings + turn
+        return step + (nearest - BEHIND), offsets, headings + turn
 
     def _seen(self, points: Floats, nearest: Integers) -> tuple[Floats, Floats, Floats, Floats]:
         x, y, cosines, sines, headings, curvatures = self.rows[:6].take(nearest, axis=1)
@@ -103,7 +103,7 @@ class Reference:
     def locate(self, x: float, y: float, near: float) -> tuple[float, float, float] | None:
         """Station, offset and the line's heading there of a point within some metres of station `near`.
 
-        Newton's method; None where that does not converge.
+        Newton's method; None where that does not converge on the line.
         """
         station = near
         for _ in range(_ITERATIONS):
@@ -115,7 +115,7 @@ class Reference:
             ahead = (x - east) * cosine + (y - north) * sine
             across = (y - north) * cosine - (x - east) * sine
             if abs(ahead) < _CONVERGED:
-                return station, across, heading
+                return (station, across, heading) if station >= 0.0 else None
             station += ahead / max(1.0 - curvature * across, _NEAREST_CENTRE)
         return None
 

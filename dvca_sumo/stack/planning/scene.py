@@ -2,12 +2,13 @@
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, PredictedObjects
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.reference import BEHIND, Window
 
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+Flags = npt.NDArray[np.bool_]
 
 _AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
 

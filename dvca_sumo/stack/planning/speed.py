@@ -29,6 +29,8 @@ _HOLD = -1.0  # [m/s^2]
 _FIRMER = 1.1  # than the constant braking that would just do
 _SAFE_GAP = 2.0  # [m] to a leader, kept by braking beyond comfort if need be
 _TOUCH = 0.1  # [m] smallest distance divided by
+_FAR = 200.0  # [m] beyond which there is no leader
+_HARDER = 1.3  # than the constant braking that would just match the leader's speed
 _GENTLE_CLOSING = 2.0  # [m/s^2] of braking to match a leader's speed, up to which comfort is enough
 
 
@@ -124,8 +126,9 @@ def _for_stop(stop: Stop, s: float, v: float, time: float, config: PlanningConfi
         allowed = max(config.acceleration - needed * needed / config.braking, -_FIRMER * needed)
     else:
         allowed = -config.hard_braking
-    firmest = _FIRMER * v * v / (2.0 * max(distance + stop.give, _TOUCH))
-    allowed = max(allowed, -max(config.comfort_braking, firmest))
+    if allowed < -config.comfort_braking:
+        firmest = _FIRMER * v * v / (2.0 * max(distance + stop.give, _TOUCH))
+        allowed = max(allowed, -max(config.comfort_braking, firmest))
     if left < math.inf:
         allowed = max(allowed, 2.0 * (distance - v * left) / (left * left))
     return allowed
@@ -133,30 +136,28 @@ def _for_stop(stop: Stop, s: float, v: float, time: float, config: PlanningConfi
 
 def _for_leader(gap: float, v: float, leader_speed: float, config: PlanningConfig) -> float:
     """The intelligent driver model; harsher than comfort only where the gap would not last otherwise."""
-    if gap > 200.0:
+    if gap > _FAR:
         return config.acceleration
     closing = v - leader_speed
     if v < _HOLD_SPEED and leader_speed < _HOLD_SPEED and gap < config.follow_gap + _HOLD_GAP:
         return _HOLD
     wanted = v * config.headway + 0.5 * v * closing / math.sqrt(config.acceleration * config.braking)
-    ratio = (config.follow_gap + max(wanted, 0.0)) / max(gap, _TOUCH)
+    ratio = (config.follow_gap + wanted if wanted > 0.0 else config.follow_gap) / max(gap, _TOUCH)
+    allowed = config.acceleration * (1.0 - ratio * ratio)
+    if allowed >= -config.comfort_braking:
+        return allowed
     needed = closing * closing / (2.0 * max(gap - _SAFE_GAP, _TOUCH)) if closing > 0.0 else 0.0
-    firmest = config.comfort_braking if needed < _GENTLE_CLOSING else max(config.comfort_braking, 1.3 * needed)
-    return max(config.acceleration * (1.0 - ratio * ratio), -firmest)
+    return max(allowed, -config.comfort_braking if needed < _GENTLE_CLOSING else -_HARDER * needed)
 
 
 def _moved(s: float, v: float, a: float, wanted: float, config: PlanningConfig) -> tuple[float, float, float]:
     """One step on, with the acceleration moving linearly towards `wanted` within the limits of jerk."""
-    jerk = (
-        config.jerk
-        if wanted > -config.comfort_braking - 1e-9 and a > -config.comfort_braking - 1e-9
-        else (config.hard_jerk)
-    )
-    after = min(max(wanted, a - jerk * STEP, -config.hard_braking), a + jerk * STEP)
+    is_comfort = wanted >= -config.comfort_braking and a >= -config.comfort_braking
+    change = (config.jerk if is_comfort else config.hard_jerk) * STEP
+    after = max(min(wanted, a + change), a - change, -config.hard_braking)
     if v <= 0.0 and after <= 0.0:
         return s, 0.0, 0.0
     reached = v + 0.5 * STEP * (a + after)
     if reached <= 0.0:
-        mean = -0.5 * (a + after)
-        return s + min(v * v / (2.0 * mean), v * STEP), 0.0, 0.0
+        return s + min(v * v / -(a + after), v * STEP), 0.0, 0.0
     return s + max(STEP * (v + STEP * (2.0 * a + after) / 6.0), 0.0), reached, after

@@ -12,11 +12,12 @@ from dvca_sumo.stack.planning.scene import Flags, Scene
 from dvca_sumo.stack.planning.speed import STEP_TIMES, Leader
 
 ALONG = 0.5  # cosine of the largest angle (60 degrees) at which someone moves along the path, not across
+PRESENT = 0.3  # [s] what occupies the path within this time is there already
 
+_BICYCLE, _PERSON = int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 _WALKS_ACROSS = 0.3  # [m/s] sideways
 _NEVER = 1e4  # [m] for places where there is no leader
 _AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
-_PRESENT = 0.3  # [s] what occupies the path within this time is there already
 
 
 class Graph(msgspec.Struct, frozen=True, eq=False):
@@ -59,8 +60,8 @@ def graph_of(
 def _margins(scene: Scene, window: Window, crossings: tuple[Crossing, ...], config: PlanningConfig) -> Floats:
     """(h,) sideways distance within which a future counts as in the way [m]."""
     classes = scene.classes[scene.owners]
-    margins = np.where(classes == ObjectClass.BICYCLE, config.bicycle_margin, config.object_margin)
-    people = classes == ObjectClass.PEDESTRIAN
+    margins = np.where(classes == _BICYCLE, config.bicycle_margin, config.object_margin)
+    people = classes == _PERSON
     if not people.any():
         return margins
     offsets, stations = scene.futures.offsets, scene.futures.stations[:, 0] + window.station
@@ -80,16 +81,22 @@ def leading(graph: Graph, scene: Scene, shape: VehicleShape, config: PlanningCon
     Left out are unlikely ones that are not about to happen, and who drives behind the ego.
     """
     rows = np.flatnonzero(graph.occupied[: scene.moving].any(axis=1))
-    leaders, others = [], []
-    for row in rows.tolist():
-        entry = float(scene.times[graph.first[row]])
-        if scene.probabilities[row] < (config.possible if entry < config.soon else config.likely):
+    is_in_lane = (graph.gaps[rows, 0] < config.object_margin).tolist()
+    is_ahead = (scene.futures.stations[rows, 0] > shape.centre).tolist()
+    chances = scene.probabilities[rows].tolist()
+    leaders: list[int] = []
+    others: list[int] = []
+    for row, in_lane, ahead, chance in zip(rows.tolist(), is_in_lane, is_ahead, chances, strict=True):
+        first = graph.first[row]
+        entry = float(scene.times[first])
+        if chance < (config.possible if entry < config.soon else config.likely):
             continue
-        is_along = abs(scene.futures.directions[row, graph.first[row]]) > ALONG
-        if entry > _PRESENT or not is_along:
+        if abs(scene.futures.directions[row, first]) < ALONG or (entry > PRESENT and not in_lane):
             others.append(row)
-        elif scene.futures.stations[row, 0] > shape.centre:
-            leaders.append(row)
+        elif ahead:
+            (leaders if entry <= PRESENT else others).append(row)
+        elif not in_lane:
+            others.append(row)
     return leaders, others
 
 
@@ -97,16 +104,19 @@ def leader_of(rows: list[int], graph: Graph, scene: Scene, shape: VehicleShape) 
     """The nearest of the futures `rows` at each moment, while they occupy the path; carried on at constant speed."""
     if not rows:
         return None
-    rears = np.where(graph.occupied[rows], graph.low[rows] - shape.front, _NEVER)
-    nearest = rears.argmin(axis=0)
-    columns = np.arange(rears.shape[1])
-    rears = rears[nearest, columns]
-    speeds = np.gradient(graph.low[rows], PREDICTION_TIMES, axis=1)[nearest, columns]
-    beyond = STEP_TIMES[-1] - scene.times[-1]
-    times = np.append(scene.times, STEP_TIMES[-1])
-    track = scene.ids[scene.owners[rows[int(nearest[int(np.argmax(rears < _NEVER))])]]]
+    low = graph.low[rows]
+    places = np.where(graph.occupied[rows], low - shape.front, _NEVER)
+    nearest = places.argmin(axis=0)
+    count = len(nearest)
+    columns = np.arange(count)
+    ends = np.minimum(columns + 1, count - 1)
+    rears, speeds, times = np.empty(count + 1), np.empty(count + 1), np.empty(count + 1)
+    rears[:-1] = places[nearest, columns]
+    speeds[:-1] = (low[nearest, ends] - low[nearest, ends - 1]) / (PREDICTION_TIMES[1] - PREDICTION_TIMES[0])
+    times[:-1], times[-1] = scene.times, STEP_TIMES[-1]
+    speeds[-1] = speeds[-2]
+    rears[-1] = rears[-2] + (times[-1] - times[-2]) * speeds[-1]
+    track = scene.ids[scene.owners[rows[nearest[(rears < _NEVER).argmax()]]]]
     return Leader(
-        np.interp(STEP_TIMES, times, np.append(rears, rears[-1] + beyond * speeds[-1])).tolist(),
-        np.interp(STEP_TIMES, times, np.append(speeds, speeds[-1])).tolist(),
-        f"follow {track}",
+        np.interp(STEP_TIMES, times, rears).tolist(), np.interp(STEP_TIMES, times, speeds).tolist(), f"follow {track}"
     )

@@ -191,3 +191,25 @@ def drive(
         _, x, y, heading, speed, acceleration, curvature = trajectory.points[1].tolist()
         estimate = LocalizationEstimate(0.1 * (index + 1), x, y, heading, speed, acceleration, speed * curvature)
     return Drive(np.array(states), trajectories, np.array(clearances))
+
+
+def assert_drivable(driven: Drive, config: PlanningConfig | None = None) -> None:
+    """Every trajectory is within hard limits and consistent, and goes on from the one before."""
+    limits = config or PlanningConfig()
+    previous: Trajectory | None = None
+    for trajectory in driven.trajectories:
+        points = trajectory.points
+        assert points.shape == (81, 7)
+        assert np.isfinite(points).all()
+        assert (points[:, 4] >= 0.0).all()
+        assert points[:, 5].min() >= -limits.hard_braking - 1e-6
+        assert points[:, 5].max() <= limits.acceleration + 1e-6
+        assert np.abs(points[:, 6]).max() < 0.25
+        steps = np.hypot(np.diff(points[:, 1]), np.diff(points[:, 2]))
+        means = 0.5 * (points[1:, 4] + points[:-1, 4])
+        assert np.abs(steps - 0.1 * means).max() < 0.06
+        if previous is not None:
+            assert np.hypot(*(points[0, 1:3] - previous.points[1, 1:3])) < 0.02
+            assert abs(math.remainder(points[0, 3] - previous.points[1, 3], 2.0 * math.pi)) < 0.01
+            assert abs(points[0, 4] - previous.points[1, 4]) < 1e-9
+        previous = trajectory

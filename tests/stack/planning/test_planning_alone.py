@@ -1,0 +1,148 @@
+"""Nobody else on the road: limits, curves, signals, signs, the destination."""
+
+import math
+
+import numpy as np
+import pytest
+from planned_drives import LIMIT, Drive, assert_drivable, curve_points, drive, road, stop_line
+
+from dvca_sumo.messages import SignalColour
+from dvca_sumo.roadmap.route import Control, Route
+
+
+def test_free_road_is_driven_at_the_limit_and_not_above() -> None:
+    driven = drive(road(), 20.0)
+    assert driven.speeds[-1] > 0.95 * LIMIT
+    assert driven.speeds.max() <= LIMIT
+    assert set(driven.decisions) == {"cruise"}
+    assert_drivable(driven)
+
+
+def test_a_lower_limit_is_kept_from_where_the_front_bumper_enters_it() -> None:
+    free = road()
+    limits = np.where(free.line.stations >= 200.0, 8.3, 13.9)
+    driven = drive(_with_limits(free, limits), 25.0, speed=13.0)
+    inside = driven.fronts > 200.0
+    assert inside.any()
+    assert driven.speeds[inside].max() <= 8.3
+    assert driven.speeds[inside][-1] > 7.5
+    assert driven.speeds[~inside].max() > 13.0
+
+
+def _with_limits(route: Route, limits: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Route:
+    return type(route)(**{**{name: getattr(route, name) for name in route.__struct_fields__}, "speed_limits": limits})
+
+
+@pytest.mark.parametrize("radius", [10.0, 25.0])
+def test_curve_is_taken_slowly_and_on_the_line(radius: float) -> None:
+    route = road(curve_points(radius))
+    driven = drive(route, 30.0, speed=13.0)
+    _, offsets = route.line.project(driven.states[:, 1:3])
+    assert np.abs(offsets).max() < 0.1
+    lateral = driven.speeds**2 * np.abs(driven.states[:, 6])
+    assert lateral.max() < 2.4
+    assert driven.speeds[driven.states[:, 6] > 0.9 / radius].max() > 0.7 * math.sqrt(2.0 * radius)
+    assert_drivable(driven)
+
+
+def test_gentle_curve_is_not_slowed_for() -> None:
+    driven = drive(road(curve_points(150.0)), 15.0, speed=13.4)
+    assert driven.speeds.min() > 13.0
+
+
+def test_stops_at_the_destination() -> None:
+    driven = drive(road(destination=150.0), 25.0, speed=10.0)
+    assert abs(driven.fronts[-1] - 150.0) < 0.5
+    assert driven.speeds[-1] == 0.0
+    assert driven.decisions[-1] == "stop destination"
+    assert driven.states[:, 5].min() > -2.6
+    assert_drivable(driven)
+
+
+def test_destination_at_the_very_end_of_the_map() -> None:
+    driven = drive(road(destination=600.0), 20.0, speed=13.0, station=500.0)
+    assert abs(driven.fronts[-1] - 600.0) < 0.5
+    assert driven.speeds[-1] == 0.0
+
+
+def at_signal(colour_at: dict[float, SignalColour], seconds: float = 20.0, *, speed: float = 13.0) -> Drive:
+    """Approach a signal whose line is at x = 120; colours by the time from which they show."""
+
+    def signals(time: float) -> dict[str, SignalColour]:
+        shown = [colour for since, colour in sorted(colour_at.items()) if since <= time]
+        return {"J/2": shown[-1]} if shown else {}
+
+    route = road(stop_lines=[stop_line(120.0, Control.SIGNAL)])
+    return drive(route, seconds, speed=speed, signals=signals)
+
+
+def test_red_light_is_stopped_at_before_the_line() -> None:
+    driven = at_signal({0.0: SignalColour.RED})
+    assert 0.2 < 120.0 - driven.fronts[-1] < 3.0
+    assert driven.speeds[-1] == 0.0
+    assert driven.decisions[-1] == "stop red J/2"
+    assert_drivable(driven)
+
+
+def test_goes_when_red_turns_green() -> None:
+    driven = at_signal({0.0: SignalColour.RED, 15.0: SignalColour.GREEN}, 25.0)
+    assert driven.fronts[149] < 120.0
+    assert driven.fronts[-1] > 150.0
+    assert_drivable(driven)
+
+
+def test_green_light_is_passed_at_speed() -> None:
+    assert at_signal({0.0: SignalColour.GREEN}).speeds.min() > 12.9
+
+
+def test_yellow_is_stopped_at_where_that_is_comfortable() -> None:
+    driven = at_signal({0.0: SignalColour.GREEN, 5.0: SignalColour.YELLOW, 8.0: SignalColour.RED})
+    assert driven.fronts[-1] < 120.0
+    assert driven.states[:, 5].min() > -3.4
+
+
+def test_late_yellow_is_passed_even_when_red_follows() -> None:
+    driven = at_signal({0.0: SignalColour.GREEN, 6.8: SignalColour.YELLOW, 7.5: SignalColour.RED})
+    assert driven.fronts[68] < 118.0
+    assert driven.speeds.min() > 12.9
+    assert driven.fronts[-1] > 150.0
+
+
+def test_green_that_goes_out_of_view_is_remembered_for_a_moment() -> None:
+    driven = at_signal({0.0: SignalColour.GREEN})
+    route = road(stop_lines=[stop_line(120.0, Control.SIGNAL)])
+    blinded = drive(
+        route, 12.0, speed=13.0, signals=lambda time: {"J/2": SignalColour.GREEN} if driven.fronts[int(time * 10)] < 105.0 else {}
+    )
+    assert blinded.speeds.min() > 12.9
+
+
+def test_signal_never_seen_is_stopped_at_and_passed_with_care_later() -> None:
+    driven = at_signal({}, 40.0)
+    standing = driven.speeds < 0.05
+    assert 4.0 < 0.1 * standing.sum() < 12.0
+    assert 0.2 < 120.0 - driven.fronts[standing][0] < 3.0
+    assert driven.fronts[-1] > 150.0
+    assert "stop unseen J/2" in driven.decisions
+
+
+@pytest.mark.parametrize("control", [Control.STOP, Control.ALL_WAY_STOP])
+def test_stop_sign_means_standing_for_a_second(control: Control) -> None:
+    driven = drive(road(stop_lines=[stop_line(100.0, control)]), 25.0, speed=10.0)
+    standing = driven.speeds < 0.05
+    assert 0.9 <= 0.1 * standing.sum() < 3.0
+    assert 0.2 < 100.0 - driven.fronts[standing][0] < 3.0
+    assert driven.fronts[-1] > 120.0
+    assert_drivable(driven)
+
+
+def test_empty_yield_line_is_passed_slowly_and_without_stopping() -> None:
+    driven = drive(road(stop_lines=[stop_line(100.0, Control.YIELD)]), 20.0, speed=13.0)
+    at_line = np.abs(driven.fronts - 100.0) < 2.0
+    assert 6.0 < driven.speeds[at_line].min() < 9.0
+    assert driven.fronts[-1] > 150.0
+
+
+def test_priority_road_is_not_slowed_for() -> None:
+    driven = drive(road(stop_lines=[stop_line(100.0, Control.PRIORITY, yields_to=frozenset())]), 15.0, speed=13.4)
+    assert driven.speeds.min() > 13.0

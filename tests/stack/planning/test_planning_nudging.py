@@ -1,0 +1,126 @@
+"""Around what stands in the way."""
+
+import msgspec
+import numpy as np
+import pytest
+from planned_drives import SHAPE, Drive, assert_drivable, car, cone, drive, person, road, stop_line
+
+from dvca_sumo.roadmap.route import Control
+
+
+def offsets(driven: Drive) -> tuple[float, float]:
+    return float(driven.states[:, 2].min()), float(driven.states[:, 2].max())
+
+
+@pytest.mark.parametrize("side", [0.0, -0.5, -1.2])
+def test_cone_in_the_lane_is_passed_on_the_free_lane_and_the_ego_returns(side: float) -> None:
+    driven = drive(road(lanes_left=1), 20.0, speed=13.0, actors=[cone(5, 120.0, side)])
+    assert driven.clearances.min() >= 0.4
+    assert driven.fronts[-1] > 200.0
+    assert abs(driven.states[-1, 2]) < 0.05
+    assert driven.decisions[50] == "nudge left 5"
+    assert_drivable(driven)
+
+
+def test_cone_in_a_single_lane_is_stopped_for() -> None:
+    driven = drive(road(), 20.0, speed=13.0, actors=[cone(5, 120.0)])
+    assert 3.0 < driven.clearances[-1] < 7.0
+    assert offsets(driven) == pytest.approx((0.0, 0.0), abs=0.05)
+
+
+def test_small_object_at_the_edge_of_a_single_lane_is_passed_within_it() -> None:
+    driven = drive(road(), 20.0, speed=13.0, actors=[cone(5, 120.0, -1.4)])
+    assert driven.fronts[-1] > 180.0
+    assert driven.clearances.min() > 0.3
+    assert offsets(driven)[1] + 0.5 * SHAPE.width < 1.6
+
+
+def test_object_well_beside_the_lane_changes_nothing() -> None:
+    driven = drive(road(lanes_left=1), 12.0, speed=13.0, actors=[car(5, 80.0, -3.4)])
+    assert set(driven.decisions) == {"cruise"}
+    assert driven.speeds.min() > 12.9
+
+
+def test_parked_car_that_juts_into_the_lane_is_passed_with_clearance() -> None:
+    driven = drive(road(lanes_left=1), 20.0, speed=13.0, actors=[car(5, 120.0, -2.2)])
+    assert driven.clearances.min() > 0.55
+    assert driven.fronts[-1] > 200.0
+    assert_drivable(driven)
+
+
+def test_standing_car_is_passed_once_it_has_stood_for_a_while() -> None:
+    driven = drive(road(lanes_left=1), 40.0, speed=10.0, actors=[car(5, 50.0)])
+    assert not any(decision.startswith("nudge") for decision in driven.decisions[:30])
+    assert driven.clearances.min() >= 0.4
+    assert driven.fronts[-1] > 100.0
+    assert_drivable(driven)
+
+
+def test_ego_that_has_stopped_behind_a_car_can_still_pull_out() -> None:
+    driven = drive(road(lanes_left=1), 30.0, speed=7.0, actors=[car(5, 27.0)])
+    assert driven.speeds.min() < 3.0
+    assert driven.clearances.min() >= 0.3
+    assert driven.fronts[-1] > 80.0
+    assert_drivable(driven)
+
+
+def test_neighbouring_lane_is_not_used_while_somebody_is_on_it() -> None:
+    overtaking = [car(k, 110.0 - 25.0 * k, 3.2, speed=9.0) for k in range(1, 9)]
+    driven = drive(road(lanes_left=1), 45.0, speed=9.0, actors=[cone(50, 110.0), *overtaking])
+    assert driven.clearances.min() > 0.4
+    assert driven.speeds.min() < 0.1
+    assert driven.fronts[-1] > 130.0
+
+
+def test_car_that_queues_at_a_signal_is_not_passed() -> None:
+    route = road(lanes_left=1, stop_lines=[stop_line(120.0, Control.SIGNAL)])
+    driven = drive(route, 30.0, speed=10.0, actors=[car(5, 114.0)])
+    assert offsets(driven) == pytest.approx((0.0, 0.0), abs=0.05)
+    assert driven.speeds[-1] == 0.0
+
+
+def test_car_that_queues_behind_others_up_to_a_signal_is_not_passed() -> None:
+    route = road(lanes_left=1, stop_lines=[stop_line(120.0, Control.SIGNAL)])
+    queue = [car(k, 116.0 - 8.0 * k, 0.0) for k in range(6)]
+    driven = drive(route, 25.0, speed=10.0, actors=queue)
+    assert offsets(driven) == pytest.approx((0.0, 0.0), abs=0.05)
+    assert driven.speeds[-1] == 0.0
+
+
+def test_two_cones_one_behind_the_other_are_passed_in_one_go() -> None:
+    driven = drive(road(lanes_left=1), 25.0, speed=12.0, actors=[cone(5, 110.0), cone(6, 125.0)])
+    between = (driven.fronts > 113.0) & (driven.fronts < 125.0)
+    assert driven.states[between, 2].min() > 1.0
+    assert driven.clearances.min() >= 0.4
+
+
+def test_gap_between_two_objects_that_is_too_narrow_is_stopped_for() -> None:
+    driven = drive(road(lanes_left=1), 25.0, speed=12.0, actors=[cone(5, 110.0, -0.9), cone(6, 110.0, 2.1)])
+    assert driven.speeds[-1] == 0.0
+    assert driven.clearances.min() > 2.0
+
+
+def test_object_on_the_left_is_passed_on_the_right() -> None:
+    route = road()
+    wide = msgspec.structs.replace(route, road_right=route.road_right - 3.2)
+    driven = drive(wide, 20.0, speed=13.0, actors=[cone(5, 120.0, 0.6)])
+    assert "nudge right 5" in driven.decisions
+    assert driven.clearances.min() >= 0.4
+
+
+def test_side_does_not_change_while_the_object_seems_to_move_about() -> None:
+    class Wobbling(type(cone(5, 120.0))):  # type: ignore[misc]
+        def box_at(self, time: float) -> list[float]:
+            return [120.0, 0.15 * np.sin(37.0 * time), 0.0, 0.4, 0.4]
+
+    route = road(lanes_left=1)
+    wide = msgspec.structs.replace(route, road_right=route.road_right - 3.2)
+    seen = Wobbling(*msgspec.structs.astuple(cone(5, 120.0)))
+    driven = drive(wide, 9.0, speed=13.0, actors=[seen])
+    assert len({decision for decision in driven.decisions if decision.startswith("nudge")}) == 1
+
+
+def test_person_who_stands_in_the_lane_is_passed_with_more_clearance() -> None:
+    driven = drive(road(lanes_left=1), 40.0, speed=8.0, actors=[person(5, 80.0, -0.8)])
+    assert driven.fronts[-1] > 100.0
+    assert driven.clearances.min() > 1.0

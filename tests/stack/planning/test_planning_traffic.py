@@ -1,0 +1,224 @@
+"""Others on the road: leading, crossing, merging, walking."""
+
+import math
+
+import numpy as np
+import pytest
+from planned_drives import SHAPE, assert_drivable, car, cone, drive, person, road, stop_line
+
+from dvca_sumo.messages import SignalColour
+from dvca_sumo.roadmap.route import Control, Crossing
+
+UP, DOWN = math.pi / 2.0, -math.pi / 2.0
+
+
+def test_slower_leader_is_followed_at_a_headway() -> None:
+    driven = drive(road(), 30.0, speed=13.0, actors=[car(3, 60.0, speed=8.0)])
+    assert driven.speeds[-1] == pytest.approx(8.0, abs=0.2)
+    assert 1.2 < driven.clearances[-1] / 8.0 < 2.6
+    assert driven.clearances.min() > 10.0
+    assert driven.decisions[50] == "follow 3"
+    assert_drivable(driven)
+
+
+def test_faster_leader_is_let_go() -> None:
+    driven = drive(road(), 15.0, speed=13.0, actors=[car(3, 60.0, speed=16.0)])
+    assert driven.speeds.min() > 12.9
+
+
+def test_leader_that_stops_is_stopped_behind() -> None:
+    driven = drive(road(), 30.0, speed=10.0, actors=[car(3, 45.0, speed=9.0, stays_from=8.0)])
+    assert driven.speeds[-1] == 0.0
+    assert driven.clearances.min() > 1.0
+    assert_drivable(driven)
+
+
+def test_leader_that_starts_again_is_followed() -> None:
+    driven = drive(road(), 30.0, actors=[car(3, 25.0, speed=7.0, leaves=12.0)])
+    assert driven.speeds[100] == 0.0
+    assert driven.speeds[-1] == pytest.approx(7.0, abs=0.5)
+
+
+def test_standing_car_in_a_single_lane_is_stopped_behind() -> None:
+    driven = drive(road(), 25.0, speed=13.0, actors=[car(5, 120.0)])
+    assert 3.0 < driven.clearances[-1] < 7.0
+    assert driven.speeds[-1] == 0.0
+    assert driven.decisions[-1] == "stop behind 5"
+    assert driven.states[:, 5].min() > -2.6
+    assert_drivable(driven)
+
+
+def test_car_behind_is_no_reason_to_do_anything() -> None:
+    driven = drive(road(), 10.0, speed=13.0, actors=[car(4, -15.0, speed=15.0)])
+    assert set(driven.decisions) == {"cruise"}
+
+
+def test_car_in_the_next_lane_is_no_reason_to_do_anything() -> None:
+    driven = drive(road(lanes_left=1), 10.0, speed=13.0, actors=[car(4, 40.0, 3.2, speed=5.0), car(6, 70.0, 3.2)])
+    assert set(driven.decisions) == {"cruise"}
+
+
+def test_oncoming_car_in_the_opposite_lane_is_no_reason_to_do_anything() -> None:
+    driven = drive(road(), 10.0, speed=13.0, actors=[car(4, 150.0, 3.2, heading=math.pi, speed=13.0)])
+    assert set(driven.decisions) == {"cruise"}
+
+
+def test_person_crossing_is_yielded_to_with_distance() -> None:
+    driven = drive(road(), 25.0, speed=13.0, actors=[person(3, 100.0, -8.0, heading=UP, speed=1.4, leaves=2.0)])
+    assert driven.clearances.min() > 1.0
+    assert "yield 3" in driven.decisions
+    assert driven.states[:, 5].min() > -3.0
+    assert driven.fronts[-1] > 150.0
+    assert_drivable(driven)
+
+
+def test_person_who_steps_out_late_is_braked_for_beyond_comfort() -> None:
+    driven = drive(road(), 15.0, speed=13.0, actors=[person(3, 45.0, -3.5, heading=UP, speed=1.5, leaves=1.0)])
+    assert driven.clearances.min() > 0.3
+    assert driven.states[:, 5].min() < -4.0
+    assert_drivable(driven)
+
+
+def test_person_who_stays_in_the_lane_is_stopped_for() -> None:
+    driven = drive(road(), 25.0, speed=13.0, actors=[person(3, 100.0, 0.0)])
+    assert driven.speeds[-1] == 0.0
+    assert driven.clearances.min() > 2.0
+
+
+def test_person_standing_off_the_road_is_just_passed() -> None:
+    driven = drive(road(), 15.0, speed=13.0, actors=[person(3, 80.0, -3.5)])
+    assert driven.speeds.min() > 12.5
+
+
+def test_person_standing_at_the_kerb_is_passed_slowly() -> None:
+    driven = drive(road(), 20.0, speed=13.0, actors=[person(3, 100.0, -2.0)])
+    beside = np.abs(driven.fronts - 100.0) < 2.0
+    assert 3.0 < driven.speeds[beside].max() < 11.0
+    assert driven.clearances.min() > 0.6
+    assert driven.fronts[-1] > 150.0
+
+
+def test_person_walking_along_the_road_is_just_passed() -> None:
+    driven = drive(road(), 15.0, speed=13.0, actors=[person(3, 80.0, -3.5, speed=1.4)])
+    assert driven.speeds.min() > 12.5
+
+
+def test_person_who_is_long_across_before_the_ego_comes_is_no_reason_to_stop() -> None:
+    driven = drive(road(), 15.0, speed=10.0, actors=[person(3, 140.0, -2.0, heading=UP, speed=1.4)])
+    assert driven.speeds.min() > 9.5
+
+
+def test_person_about_to_use_a_crossing_is_waited_for_before_it() -> None:
+    crossing = Crossing("c", 98.0, 102.0)
+    driven = drive(
+        road(crossings=[crossing]), 25.0, speed=10.0, actors=[person(3, 100.0, -6.0, heading=UP, speed=1.2, leaves=3.0)]
+    )
+    assert driven.clearances.min() > 1.5
+    assert "yield 3" in driven.decisions
+    assert driven.fronts[-1] > 120.0
+
+
+def crossing_car(**changes: object) -> object:
+    return car(3, 106.0, -80.0, heading=UP, speed=10.0, **changes)
+
+
+def test_car_with_priority_from_a_side_road_is_yielded_to() -> None:
+    driven = drive(
+        road(stop_lines=[stop_line(100.0, Control.YIELD)]),
+        25.0,
+        speed=13.0,
+        actors=[car(3, 106.0, -80.0, heading=UP, speed=10.0, lanes=("major_0",))],
+    )
+    assert "yield 3" in driven.decisions
+    assert driven.clearances.min() > 2.0
+    assert driven.fronts[-1] > 150.0
+    assert_drivable(driven)
+
+
+def test_stream_with_priority_is_waited_for_at_the_line() -> None:
+    stream = [car(k, 106.0, -60.0 - 25.0 * k, heading=UP, speed=10.0, lanes=("major_0",)) for k in range(8)]
+    driven = drive(road(stop_lines=[stop_line(100.0, Control.YIELD)]), 40.0, speed=13.0, actors=stream)
+    standing = driven.speeds < 0.05
+    assert standing.sum() > 10
+    assert 0.2 < 100.0 - driven.fronts[standing][-1] < 3.0
+    assert driven.clearances.min() > 2.0
+    assert driven.fronts[-1] > 150.0
+
+
+def test_car_that_has_to_wait_is_passed() -> None:
+    driven = drive(
+        road(stop_lines=[stop_line(100.0, Control.PRIORITY, yields_to=frozenset())]),
+        20.0,
+        speed=13.0,
+        actors=[car(3, 106.0, -80.0, heading=UP, speed=10.0, stays_from=7.0, lanes=("minor_0",))],
+    )
+    assert driven.speeds.min() > 12.9
+
+
+def test_car_that_should_wait_but_cannot_any_more_is_yielded_to() -> None:
+    driven = drive(
+        road(stop_lines=[stop_line(100.0, Control.PRIORITY, yields_to=frozenset())]),
+        20.0,
+        speed=13.0,
+        actors=[car(3, 106.0, -110.0, heading=UP, speed=14.0, lanes=("minor_0",))],
+    )
+    assert driven.clearances.min() > 1.0
+    assert driven.states[:, 5].min() < -2.0
+
+
+def test_crossing_traffic_has_no_priority_over_green_but_over_permissive_green() -> None:
+    actors = [car(3, 106.0, -75.0, heading=UP, speed=8.0, stays_from=7.0, lanes=("major_0",))]
+    route = road(stop_lines=[stop_line(100.0, Control.SIGNAL)])
+    green = drive(route, 12.0, speed=13.0, actors=actors, signals=lambda _: {"J/2": SignalColour.GREEN})
+    permissive = drive(route, 12.0, speed=13.0, actors=actors, signals=lambda _: {"J/2": SignalColour.PERMISSIVE})
+    assert green.speeds.min() > 12.9
+    assert permissive.speeds.min() < 9.0
+
+
+def test_car_that_cuts_in_ahead_becomes_the_leader() -> None:
+    cutting = car(3, 45.0, 3.2, heading=-0.08, speed=8.0)
+    driven = drive(road(lanes_left=1), 6.0, speed=12.0, actors=[cutting])
+    assert "follow 3" in driven.decisions
+    assert driven.clearances.min() > 3.0
+
+
+def test_junction_is_not_entered_while_its_exit_is_occupied() -> None:
+    line = stop_line(100.0, Control.PRIORITY, yields_to=frozenset())
+    driven = drive(road(stop_lines=[line]), 20.0, speed=10.0, actors=[car(3, 118.0)])
+    assert driven.speeds[-1] == 0.0
+    assert driven.fronts[-1] < 100.0
+    far = drive(road(stop_lines=[line]), 20.0, speed=10.0, actors=[car(3, 130.0)])
+    assert far.fronts[-1] - SHAPE.length > 112.0
+
+
+def test_unlikely_future_is_ignored_and_a_likely_one_is_not() -> None:
+    from planned_drives import believed, predicted  # noqa: PLC0415
+
+    import msgspec  # noqa: PLC0415
+
+    from dvca_sumo.stack.planning import Planner, PlanningConfig  # noqa: PLC0415
+
+    crossing = predicted([person(3, 60.0, -6.0, heading=UP, speed=1.4)], 0.0)
+    decisions = {}
+    for chance in (0.1, 0.5):
+        future = msgspec.structs.replace(crossing, probabilities=np.array([chance]))
+        decisions[chance] = Planner(PlanningConfig(), road(), SHAPE).step(believed(5.0, speed=12.0), future, {}).decision
+    assert decisions == {0.1: "cruise", 0.5: "yield 3"}
+
+
+def test_object_without_a_future_stays_where_it_is() -> None:
+    from planned_drives import believed, predicted  # noqa: PLC0415
+
+    import msgspec  # noqa: PLC0415
+
+    from dvca_sumo.stack.planning import Planner, PlanningConfig  # noqa: PLC0415
+
+    unknown = msgspec.structs.replace(
+        predicted([car(3, 30.0, speed=5.0)], 0.0),
+        owners=np.array([], dtype=np.int64),
+        probabilities=np.array([]),
+        poses=np.empty((0, 25, 3)),
+        lanes=(),
+    )
+    trajectory = Planner(PlanningConfig(), road(), SHAPE).step(believed(5.0, speed=8.0), unknown, {})
+    assert trajectory.points[-1, 1] + SHAPE.front < 30.0 - 2.25

@@ -1,0 +1,112 @@
+"""Where plans begin, and what a trajectory promises."""
+
+import math
+
+import numpy as np
+from planned_drives import SHAPE, believed, car, curve_points, predicted, road
+
+from dvca_sumo.messages import TRAJECTORY_TIMES, Trajectory
+from dvca_sumo.stack.planning import Planner, PlanningConfig
+from dvca_sumo.stack.planning.reference import BEHIND, Reference
+
+NOBODY = predicted([], 0.0)
+
+
+def planner() -> Planner:
+    return Planner(PlanningConfig(), road(), SHAPE)
+
+
+def test_row_0_is_the_believed_state_at_its_time() -> None:
+    trajectory = planner().step(believed(50.0, 0.4, 0.05, 9.0, time=3.5), NOBODY, {})
+    assert trajectory.time == 3.5
+    assert np.abs(trajectory.points[0, 1:5] - [50.0, 0.4, 0.05, 9.0]).max() < 1e-3
+    assert (trajectory.points[:, 0] == TRAJECTORY_TIMES).all()
+
+
+def test_small_deviation_goes_on_from_the_previous_trajectory() -> None:
+    plan = planner()
+    first = plan.step(believed(50.0, speed=10.0), NOBODY, {})
+    second = plan.step(believed(50.6, 0.3, 0.05, 9.5, time=0.1), NOBODY, {})
+    assert np.abs(second.points[0, 1:5] - first.points[1, 1:5]).max() < 1e-6
+
+
+def test_far_deviation_starts_again_from_the_believed_state() -> None:
+    for believed_state in (
+        believed(51.0, 0.8, 0.0, 10.0, time=0.1),
+        believed(53.5, 0.0, 0.0, 10.0, time=0.1),
+        believed(51.0, 0.0, 0.3, 10.0, time=0.1),
+        believed(51.0, 0.0, 0.0, 5.0, time=0.1),
+        believed(51.0, 0.0, 0.0, 10.0, time=20.0),
+    ):
+        plan = planner()
+        plan.step(believed(50.0, speed=10.0), NOBODY, {})
+        points = plan.step(believed_state, NOBODY, {}).points
+        state = [believed_state.x, believed_state.y, believed_state.heading, believed_state.speed]
+        assert np.abs(points[0, 1:5] - state).max() < 1e-3
+
+
+def test_ego_beside_its_lane_is_led_back_to_it() -> None:
+    points = planner().step(believed(50.0, 1.5, 0.1, 8.0), NOBODY, {}).points
+    assert abs(points[-1, 2]) < 0.01
+    assert points[:, 2].max() < 2.5
+    assert np.abs(points[:, 6]).max() < 0.15
+
+
+def test_off_the_route_the_ego_brakes_straight_ahead() -> None:
+    for lost in (believed(50.0, 30.0, 0.3, 10.0), believed(50.0, 0.0, 2.5, 10.0)):
+        trajectory = planner().step(lost, NOBODY, {})
+        assert trajectory.decision == "stop off route"
+        points = trajectory.points
+        assert points[-1, 4] == 0.0
+        assert (points[:, 6] == 0.0).all()
+        assert np.allclose(points[:, 3], lost.heading)
+        along = (points[:, 1] - lost.x) * math.cos(lost.heading) + (points[:, 2] - lost.y) * math.sin(lost.heading)
+        assert abs(along[-1] - 10.0**2 / (2.0 * PlanningConfig().comfort_braking)) < 1e-6
+
+
+def test_back_on_the_route_planning_goes_on() -> None:
+    plan = planner()
+    plan.step(believed(50.0, 30.0, 0.0, 5.0), NOBODY, {})
+    assert plan.step(believed(60.0, 0.0, 0.0, 5.0, time=0.1), NOBODY, {}).decision == "cruise"
+
+
+def test_ego_just_before_the_start_of_the_line_can_plan() -> None:
+    assert planner().step(believed(-1.0), NOBODY, {}).decision == "cruise"
+
+
+def test_old_predictions_are_taken_on_to_the_present() -> None:
+    leader = predicted([car(3, 40.0, speed=10.0)], 0.0)
+    early = planner().step(believed(10.0, speed=10.0), leader, {})
+    late = planner().step(believed(10.0, speed=10.0, time=0.5), leader, {})
+    assert late.points[-1, 1] > early.points[-1, 1] + 1.0
+
+
+def test_same_input_gives_the_same_trajectories() -> None:
+    def driven() -> list[Trajectory]:
+        plan = planner()
+        inputs = predicted([car(3, 40.0, speed=8.0), car(5, 90.0, -2.3)], 0.0)
+        return [plan.step(believed(10.0 + k, speed=10.0, time=0.1 * k), inputs, {}) for k in range(5)]
+
+    for one, other in zip(driven(), driven(), strict=True):
+        assert one.decision == other.decision
+        assert (one.points == other.points).all()
+
+
+def test_window_projects_like_the_line_itself() -> None:
+    route = road(curve_points(12.0))
+    window = Reference(route, SHAPE).window(90.3, 80.0)
+    draws = np.random.default_rng(1)
+    stations, sideways = draws.uniform(75.0, 165.0, 400), draws.uniform(-6.0, 6.0, 400)
+    points = route.line.poses(stations, sideways)
+    found, offsets, headings = window.project(points[:, :2])
+    assert np.abs(found + 90.3 - stations).max() < 0.05
+    assert np.abs(offsets - sideways).max() < 0.02
+    assert np.abs(headings - points[:, 2]).max() < 0.02
+
+
+def test_window_tells_points_beyond_its_ends_from_points_on_the_line() -> None:
+    window = Reference(road(), SHAPE).window(100.0, 50.0)
+    stations, offsets, _ = window.project(np.array([[70.0, 0.0], [200.0, 0.5], [120.0, 0.5]]))
+    assert stations[0] >= -BEHIND - 1.5
+    assert np.abs(offsets[:2]).min() > 5.0
+    assert offsets[2] == 0.5
