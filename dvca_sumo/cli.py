@@ -90,7 +90,7 @@ def program() -> None:
 @click.option("--end", type=float, metavar="T", help="Latest end of the simulation [s].")
 @click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Folder for result.json.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
-def run(  # noqa: PLR0913 - one parameter an option
+def run(
     sumocfg: Path,
     faults: tuple[str, ...],
     ego: str | None,
@@ -105,7 +105,7 @@ def run(  # noqa: PLR0913 - one parameter an option
     output: Path | None,
     as_json: bool,  # noqa: FBT001
 ) -> None:
-    """Run a scenario; if a violation occurs, find the component and the message that caused it.
+    r"""Run a scenario; if a violation occurs, find the component and the message that caused it.
 
     SUMOCFG is any SUMO configuration. The ego is --ego, or the vehicle with the parameter
     dvca.ego=true, or the vehicle with the id "ego". Nothing is written beside the configuration.
@@ -158,7 +158,7 @@ def main() -> NoReturn:
     except (KeyboardInterrupt, click.Abort):
         _tell("interrupted")
         _leave(ExitCode.INTERRUPTED)
-    except Exception as error:  # noqa: BLE001 - the last line of defence: a defect of this program
+    except Exception as error:
         _tell(f"internal error: {type(error).__name__}: {error} (set DVCA_SUMO_TRACEBACK=1 to see where)")
         if os.environ.get("DVCA_SUMO_TRACEBACK"):
             raise
@@ -167,7 +167,13 @@ def main() -> NoReturn:
 
 
 def _publish(
-    scenario: Scenario, faults: tuple[Fault, ...], found: Attribution, timing: Timing, output: Path | None, *, as_json: bool
+    scenario: Scenario,
+    faults: tuple[Fault, ...],
+    found: Attribution,
+    timing: Timing,
+    output: Path | None,
+    *,
+    as_json: bool,
 ) -> None:
     result = result_of(scenario, faults, found, timing)
     if output is not None:

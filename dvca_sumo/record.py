@@ -86,7 +86,9 @@ def moved_on(moment: Moment, ego: EgoTruth) -> Moment:
         return moment
     boxes = moment.objects.boxes.copy()
     boxes[:, :2] += elapsed * moment.objects.velocities
-    return Moment(ego, moment.shape, msgspec.structs.replace(moment.objects, time=ego.time, boxes=boxes), moment.signals)
+    return Moment(
+        ego, moment.shape, msgspec.structs.replace(moment.objects, time=ego.time, boxes=boxes), moment.signals
+    )
 
 
 def digest_of(record: Record) -> str:

@@ -43,5 +43,5 @@ class Moment(msgspec.Struct, frozen=True):
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """In seconds, SUMO's clock."""
         return self.ego.time

@@ -99,11 +99,13 @@ def attribute(engine: Engine, request: Request, progress: Progress) -> Attributi
     is_mission = violation.category is Category.MISSION
     until = math.inf if is_mission else violation.time + SETTLE
     futures = recorded_futures(record.moments)
-    dtest = Dtest(engine, Setting(request.scenario, request.faults, futures, until, is_mission, jitters), progress.probe)
+    dtest = Dtest(
+        engine, Setting(request.scenario, request.faults, futures, until, is_mission, jitters), progress.probe
+    )
     found = replace(found, violation=violation, until=until, verdict=Verdict.UNRESOLVED)
     try:
-        for found in _steps(found, engine, dtest, factual, request):  # noqa: B007 - each is the answer so far
-            pass
+        for answer in _steps(found, engine, dtest, factual, request):
+            found = answer
     except KeyboardInterrupt:
         partial = replace(found, probes=tuple(dtest.probes), reason="interrupted")
         raise AttributionStoppedError(partial) from None
@@ -112,9 +114,7 @@ def attribute(engine: Engine, request: Request, progress: Progress) -> Attributi
     )
 
 
-def _steps(
-    found: Attribution, engine: Engine, dtest: Dtest, factual: Task, request: Request
-) -> Iterator[Attribution]:
+def _steps(found: Attribution, engine: Engine, dtest: Dtest, factual: Task, request: Request) -> Iterator[Attribution]:
     """The answer after each step of Algorithm 1."""
     doubt = _premise(engine, dtest, factual, found)
     if doubt:
@@ -153,9 +153,7 @@ def _planning_message(found: Attribution, engine: Engine) -> Attribution:
     if finding is None:
         reason = f"{found.reason}; no planning message by itself breaks the specification"
         return replace(found, reason=reason)
-    return replace(
-        found, message=finding.mark, differences=(Difference("trajectory", finding.reason, 0.0),)
-    )
+    return replace(found, message=finding.mark, differences=(Difference("trajectory", finding.reason, 0.0),))
 
 
 def _component_message(found: Attribution, dtest: Dtest, answer: ComponentAnswer, *, is_exact: bool) -> Attribution:

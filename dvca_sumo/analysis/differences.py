@@ -43,9 +43,7 @@ class Difference(msgspec.Struct, frozen=True):
     size: float  # [m] or [m/s] or comparable: what is listed first
 
 
-def differences(
-    record: Record, message: MessageId, futures: Futures, focus: str | None
-) -> tuple[Difference, ...]:
+def differences(record: Record, message: MessageId, futures: Futures, focus: str | None) -> tuple[Difference, ...]:
     """How a recorded message differs from what its idealized substitute would have said, worst first.
 
     Of objects, only `focus` (an id) counts, or the one most in the ego's way where there is none.
@@ -126,7 +124,8 @@ def _of_object(
         Difference("position", f"object {name} {_place(ahead, left)} of its true place", math.hypot(ahead, left)),
         Difference(
             "size",
-            f"object {name} {said.boxes[row, 3]:.1f} x {said.boxes[row, 4]:.1f} m; truth: {box[3]:.1f} x {box[4]:.1f} m",
+            f"object {name} is {said.boxes[row, 3]:.1f} x {said.boxes[row, 4]:.1f} m; "
+            f"truth: {box[3]:.1f} x {box[4]:.1f} m",
             float(np.abs(size).max()),
         ),
         Difference("velocity", f"object {name} at {speeds}", change),

@@ -12,7 +12,7 @@ import msgspec
 from dvca_sumo.analysis.violating import is_same_family
 from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.frames import relative, transferred
-from dvca_sumo.messages import ACCELERATION, CURVATURE, HEADING, SPEED, X, Y, Component, MessageId, Trajectory
+from dvca_sumo.messages import ACCELERATION, CURVATURE, HEADING, SPEED, Component, MessageId, Trajectory, X, Y
 from dvca_sumo.oracles import judge, judges
 from dvca_sumo.record import MessageMark, Record
 from dvca_sumo.roadmap import RoadMap
@@ -60,9 +60,7 @@ def first_violating_plan(
 
 def _discontinuity(record: Record, trajectory: Trajectory, tick: int) -> str:
     believed, first = record.believed_at(tick), trajectory.points[0]
-    ahead, left, _ = relative(
-        (float(first[X]), float(first[Y]), 0.0), (believed.x, believed.y, believed.heading)
-    )
+    _ahead, left, _ = relative((float(first[X]), float(first[Y]), 0.0), (believed.x, believed.y, believed.heading))
     if abs(left) > BESIDE:
         side = "left" if left > 0.0 else "right"
         return f"the trajectory begins {abs(left):.1f} m to the {side} of where the ego believes to be"
@@ -96,9 +94,7 @@ def _driven(record: Record, trajectory: Trajectory, tick: int) -> list[Moment]:
     """The recorded truth with the ego where the trajectory, read from its true place, takes it."""
     believed, ego = record.believed_at(tick), record.path[tick]
     origin = (ego.x, ego.y, ego.heading)
-    poses = transferred(
-        trajectory.points[:, [X, Y, HEADING]], (believed.x, believed.y, believed.heading), origin
-    )
+    poses = transferred(trajectory.points[:, [X, Y, HEADING]], (believed.x, believed.y, believed.heading), origin)
     moments: list[Moment] = []
     for moment in record.moments:
         elapsed = moment.time - trajectory.time

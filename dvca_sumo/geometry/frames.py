@@ -18,17 +18,13 @@ def transferred(poses: Floats, source: Pose, target: Pose) -> Floats:
     turn = target[2] - source[2]
     cos, sin = math.cos(turn), math.sin(turn)
     dx, dy = poses[:, 0] - source[0], poses[:, 1] - source[1]
-    return np.column_stack(
-        [target[0] + cos * dx - sin * dy, target[1] + sin * dx + cos * dy, poses[:, 2] + turn]
-    )
+    return np.column_stack([target[0] + cos * dx - sin * dy, target[1] + sin * dx + cos * dy, poses[:, 2] + turn])
 
 
 def rotated(vectors: Floats, turn: float) -> Floats:
     """Vectors (n, 2) turned counter-clockwise by `turn` [rad]."""
     cos, sin = math.cos(turn), math.sin(turn)
-    return np.column_stack(
-        [cos * vectors[:, 0] - sin * vectors[:, 1], sin * vectors[:, 0] + cos * vectors[:, 1]]
-    )
+    return np.column_stack([cos * vectors[:, 0] - sin * vectors[:, 1], sin * vectors[:, 0] + cos * vectors[:, 1]])
 
 
 def relative(pose: Pose, origin: Pose) -> Pose:

@@ -18,17 +18,17 @@ from dvca_sumo.messages import (
     HEADING,
     PREDICTION_TIMES,
     SPEED,
-    T,
-    X,
-    Y,
     ControlCommand,
     Floats,
     Integers,
     LocalizationEstimate,
     Message,
     PredictedObjects,
+    T,
     TrackedObjects,
     Trajectory,
+    X,
+    Y,
 )
 
 Parameters = Mapping[str, float | str]
@@ -42,7 +42,11 @@ def drop_objects(message: Message, parameters: Parameters, occasion: Occasion) -
         return message
     kept = np.setdiff1d(np.arange(len(tracked.ids)), rows)
     return TrackedObjects(
-        tracked.time, tracked.ids[kept], tracked.classes[kept], tracked.boxes[kept], tracked.velocities[kept],
+        tracked.time,
+        tracked.ids[kept],
+        tracked.classes[kept],
+        tracked.boxes[kept],
+        tracked.velocities[kept],
         tracked.signals,
     )
 
@@ -127,7 +131,12 @@ def change_speed(message: Message, parameters: Parameters, occasion: Occasion) -
     beyond = np.maximum(driven - planned[-1], 0.0)
     headings = np.unwrap(points[:, HEADING])
     rising = planned + np.arange(len(planned)) * 1e-9  # a standing plan repeats its last station
-    for column, values in ((X, points[:, X]), (Y, points[:, Y]), (HEADING, headings), (CURVATURE, points[:, CURVATURE])):
+    for column, values in (
+        (X, points[:, X]),
+        (Y, points[:, Y]),
+        (HEADING, headings),
+        (CURVATURE, points[:, CURVATURE]),
+    ):
         points[:, column] = np.interp(driven, rising, values)
     points[:, X] += beyond * math.cos(headings[-1])
     points[:, Y] += beyond * math.sin(headings[-1])

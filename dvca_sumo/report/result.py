@@ -58,7 +58,9 @@ def result_of(scenario: Scenario, faults: tuple[Fault, ...], found: Attribution,
         "component": _component(found),
         "alternatives": [] if found.components is None else [one.value for one in found.components.alternatives],
         "substitutions": _substitutions(found),
-        "message": None if found.message is None else {"component": found.message.component.value, **_mark(found.message)},
+        "message": None
+        if found.message is None
+        else {"component": found.message.component.value, **_mark(found.message)},
         "differences": [{"field": one.field, "text": one.text} for one in found.differences],
         "interval": _interval(found),
         "probes": [_probe(probe) for probe in found.probes],
@@ -73,7 +75,11 @@ def result_of(scenario: Scenario, faults: tuple[Fault, ...], found: Attribution,
         },
         "reproducible": found.is_reproducible,
         "digest": found.digest,
-        "versions": {"dvca_sumo": _version("dvca-sumo"), "sumo": _version("libsumo"), "python": platform.python_version()},
+        "versions": {
+            "dvca_sumo": _version("dvca-sumo"),
+            "sumo": _version("libsumo"),
+            "python": platform.python_version(),
+        },
     }
 
 

@@ -70,7 +70,8 @@ def _which_component(found: Attribution) -> Iterator[str]:
     name = answer.component.value if answer.component is not None else "could not be told"
     yield f"COMPONENT  {name}"
     yield f"  because  {found.reason}"
-    yield f"  all four ideal      {_ANSWERS[answer.all_ideal].replace('this alone prevents it', 'planning can handle it')}"
+    together = "safe: planning can handle it" if answer.all_ideal is Outcome.SAFE else _ANSWERS[answer.all_ideal]
+    yield f"  all four ideal      {together}"
     for component, outcome in answer.singles.items():
         yield f"  ideal {component.value:<13} {_ANSWERS[outcome]}"
     if answer.alternatives:
@@ -86,7 +87,8 @@ def _which_message(found: Attribution) -> Iterator[str]:
     ego = record.path[tick]
     yield ""
     yield f"MESSAGE    {mark.component.value} #{mark.index} at {mark.time:.2f} s - open this one first"
-    yield f"  ego      at ({ego.x:.1f}, {ego.y:.1f}), {ego.speed:.1f} m/s, {ego.acceleration:+.1f} m/s^2, state {_state(mark)}"
+    yield f"  ego      at ({ego.x:.1f}, {ego.y:.1f}), {ego.speed:.1f} m/s, {ego.acceleration:+.1f} m/s^2"
+    yield f"  state    {_state(mark)}"
     for row, difference in enumerate(found.differences):
         yield f"  {'wrong' if row == 0 else '':<8} {difference.text}"
     if found.messages is not None:
@@ -142,7 +144,9 @@ def _state(mark: MessageMark) -> str:
 
 
 def _came_out(record: Record) -> str:
-    return "arrived" if record.ending.value == "arrived" else f"was on its way ({record.ending.value.replace('_', ' ')})"
+    return (
+        "arrived" if record.ending.value == "arrived" else f"was on its way ({record.ending.value.replace('_', ' ')})"
+    )
 
 
 def _driven(record: Record) -> float:

@@ -1,5 +1,6 @@
 """The closed loop of one run: the world steps, the stack drives, the oracles judge."""
 
+import math
 import os
 import tempfile
 from collections.abc import Callable
@@ -21,7 +22,7 @@ from dvca_sumo.world import Entry, VehicleLimits, World, shape_of
 __all__ = ["Drive", "RoadMapOf", "StopRule", "Task", "rtest"]
 
 _SHORTEST_AUTO_TRIP = 500.0  # [m]
-# A trip may take so long when the scenario sets no end.
+# Longest allowed duration of a trip, unless the scenario ends before.
 _PATIENCE = 3.0  # times the free-flow travel time ...
 _PATIENCE_BASE = 90.0  # [s] ... plus this
 
@@ -67,7 +68,7 @@ def _departure(task: Task, world: World, roadmap_of: RoadMapOf, factory: StackFa
     thresholds, roadmap = _thresholds(entry), roadmap_of(entry.vehicle_class)
     stack = factory(StackContext(roadmap, route, shape_of(entry), task.seed))
     ego = world.adopt(entry, route, VehicleLimits())
-    latest = scenario.end if scenario.end is not None else entry.time + _patience(route)
+    latest = min(entry.time + _patience(route), math.inf if scenario.end is None else scenario.end)
     return Drive(ego, stack, Judging(judges(route, thresholds, roadmap), thresholds), task, latest)
 
 

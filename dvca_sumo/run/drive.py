@@ -18,6 +18,7 @@ from dvca_sumo.messages import (
     Trajectory,
 )
 from dvca_sumo.oracles import Oracle
+from dvca_sumo.oracles.no_progress import NoProgress
 from dvca_sumo.record import TICK, Execution, Record, moved_on
 from dvca_sumo.run.task import Task
 from dvca_sumo.stack.ideal import SUBSTITUTES
@@ -78,6 +79,7 @@ class Drive:
         self._tick = 0
         self._start = ego.vehicle.truth.time
         self._contact = self._breach = math.inf  # [s] time of the first contact, of the first violation
+        self._is_stuck = False
         self._ending: Ending | None = None
         self._executions: dict[Component, list[Execution]] = {component: [] for component in COMPONENTS}
         self._altered: dict[Component, list[int]] = {component: [] for component in COMPONENTS}
@@ -220,18 +222,18 @@ class Drive:
             return  # what follows a crash is not simulated truly
         for oracle in self._oracles:
             violation = oracle.observe(moment)
-            while violation is not None:
+            if violation is not None:
                 self._violations.append(violation)
                 self._breach = min(self._breach, moment.time)
+                self._is_stuck |= violation.kind == NoProgress.kind
                 if violation.contact is not None:
                     self._contact = moment.time
-                violation = None
 
     def _ended(self, moment: Moment) -> Ending | None:
         rule, beyond = self._task.stop, self.ego.station() + self.ego.shape.front - self.ego.route.destination
         if abs(beyond) <= _ARRIVED_WITHIN and moment.ego.speed == 0.0:
             return Ending.ARRIVED
-        if moment.time >= self._latest - TICK or beyond > _LOST_BEYOND:
+        if moment.time >= self._latest - TICK or beyond > _LOST_BEYOND or self._is_stuck:
             return Ending.TIME_OVER
         stop = min(rule.at, self._breach + rule.after_violation, self._contact + rule.after_contact)
         return Ending.CUT if moment.time >= stop - TICK else None

@@ -114,7 +114,9 @@ def _overrides(configuration: Configuration, seed: int, begin: float) -> tuple[O
     never = {"save-state.times": "1e9", "save-state.period": "-1"}
     wanted += [(name, used, "nothing is written for a run") for name, used in never.items() if name in options]
     wanted += [
-        (name, "", "files of the terminal-less run") for name in ("gui-settings-file", "output-prefix") if name in options
+        (name, "", "files of the terminal-less run")
+        for name in ("gui-settings-file", "output-prefix")
+        if name in options
     ]
     return tuple(
         Override(option, options.get(option), used, reason)

@@ -124,9 +124,7 @@ def opened_text(path: Path) -> str:
 
 def _files(config: Path, options: dict[str, str], name: str) -> tuple[Path, ...]:
     paths = tuple(
-        (config.parent / part.strip()).resolve()
-        for part in re.split(r"[,;]", options.get(name, ""))
-        if part.strip()
+        (config.parent / part.strip()).resolve() for part in re.split(r"[,;]", options.get(name, "")) if part.strip()
     )
     for path in paths:
         if not path.is_file():

@@ -92,10 +92,13 @@ def _marked(text: str, path: str) -> list[str]:
         for event, element in ET.iterparse(io.StringIO(text), ("start", "end")):  # noqa: S314 - the user's own file
             if event == "start" and element.tag in ("vehicle", "trip", "flow"):
                 current = element
-            elif event == "end" and element.tag == "param" and element.get("key") == "dvca.ego" and current is not None:
-                if (element.get("value") or "").lower() == "true":
-                    name = current.get("id", "")
-                    found.append(f"{name}.0" if current.tag == "flow" else name)
+            elif event == "end" and current is not None and _is_mark(element):
+                name = current.get("id", "")
+                found.append(f"{name}.0" if current.tag == "flow" else name)
     except ET.ParseError as error:
         raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
     return found
+
+
+def _is_mark(element: ET.Element) -> bool:
+    return element.tag == "param" and element.get("key") == "dvca.ego" and element.get("value", "").lower() == "true"

@@ -20,9 +20,6 @@ from dvca_sumo.messages import (
     CURVATURE,
     HEADING,
     PREDICTION_TIMES,
-    T,
-    X,
-    Y,
     Component,
     ControlCommand,
     Floats,
@@ -30,8 +27,11 @@ from dvca_sumo.messages import (
     Message,
     PoseStep,
     PredictedObjects,
+    T,
     TrackedObjects,
     Trajectory,
+    X,
+    Y,
 )
 
 CONTROL_STEP = 0.01  # [s]

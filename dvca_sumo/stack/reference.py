@@ -107,7 +107,7 @@ def built_checked(source: str, factory: StackFactory) -> StackFactory:
     def build(context: StackContext) -> Stack:
         try:
             stack = factory(context)
-        except Exception as error:  # noqa: BLE001 - a user's factory may raise anything
+        except Exception as error:
             raise StackError(f"stack factory {source!r} raised {_said(error)}") from error
         if not isinstance(stack, Stack):
             raise StackError(f"stack factory {source!r} returned {type(stack).__name__}, not a Stack")

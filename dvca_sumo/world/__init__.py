@@ -77,7 +77,7 @@ class World:
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """In seconds, SUMO's clock."""
         return self._session.time
 
     def await_ego(self, settings: Sequence[str], is_fit: Callable[[Entry], bool]) -> Entry:

@@ -1,5 +1,6 @@
 """Bodies that never move: cones, dividers, kerbs, drawn in SUMO as POIs and polygons."""
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -34,7 +35,7 @@ def boxes_of_polygon(shape: Sequence[tuple[float, float]], is_filled: bool, line
         heading = math.atan2(along[1], along[0])
         return [(centre[0], centre[1], heading, float(np.hypot(*along)), float(np.hypot(*across)))]
     boxes: list[Box] = []
-    for (x0, y0), (x1, y1) in zip(shape, shape[1:], strict=False):
+    for (x0, y0), (x1, y1) in itertools.pairwise(shape):
         length = math.hypot(x1 - x0, y1 - y0)
         if length > 0.0:
             boxes.append(((x0 + x1) / 2.0, (y0 + y1) / 2.0, math.atan2(y1 - y0, x1 - x0), length, line_width))

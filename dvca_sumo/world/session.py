@@ -1,4 +1,6 @@
-"""One SUMO simulation. Rules of this file:
+"""One SUMO simulation.
+
+Rules of this file:
 
 - It is the only one that imports libsumo; a process holds one simulation at a time.
 - SUMO's conventions (front bumper, degrees clockwise from north) end here: everything returned is in
@@ -86,7 +88,7 @@ class Session:
 
     @property
     def time(self) -> float:
-        """[s]"""
+        """In seconds, SUMO's clock."""
         return float(libsumo.simulation.getTime())
 
     @property
@@ -208,7 +210,9 @@ class Session:
             shape_of = libsumo.polygon
             if shape_of.getType(name).startswith(OBSTACLE):
                 boxes = boxes_of_polygon(shape_of.getShape(name), shape_of.getFilled(name), shape_of.getLineWidth(name))
-                names += [f"polygon:{name}" if len(boxes) == 1 else f"polygon:{name}#{part}" for part in range(len(boxes))]
+                names += [
+                    f"polygon:{name}" if len(boxes) == 1 else f"polygon:{name}#{part}" for part in range(len(boxes))
+                ]
                 rows += boxes
         return Obstacles(tuple(names), np.array(rows, dtype=np.float64).reshape(-1, 5))
 

@@ -11,7 +11,8 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     stitch_longitudinal: float = 1.5  # [m] what actuator lag leaves when the speed changes
     stitch_heading: float = 0.2  # [rad]
     stitch_speed: float = 2.5  # [m/s]
-    off_route: float = 8.0  # [m] from the reference line: two lanes; beyond, the map says nothing about the ego
+    off_route: float = 15.0  # [m] from the reference line: what a turn too tight for the ego leaves it at, and more
+    astray_speed: float = 3.0  # [m/s] while the ego points elsewhere than any smooth path back to the line
 
     # Limits of motion.
     cruise_fraction: float = 0.97  # of the speed limit: room for what control overshoots
@@ -24,6 +25,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     hard_jerk: float = 20.0  # [m/s^3] when braking harder than comfort
     lateral_acceleration: float = 2.0  # [m/s^2] in curves
     shift_acceleration: float = 1.2  # [m/s^2] when moving sideways
+    hard_shift_acceleration: float = 2.5  # [m/s^2] when there is no room for comfort
     curvature: float = 0.15  # [1/m] of a sideways move at low speed: within the steering of a car
 
     # Distances kept lengthwise, from the front bumper.
@@ -50,6 +52,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     edge_clearance: float = 0.2  # [m] to the edge of the road
     nudge_hold: float = 0.15  # [m] smaller changes of a target are taken for noise
     standing_speed: float = 0.5  # [m/s] slower than this is standing: above the noise of a tracker
+    moving_speed: float = 1.0  # [m/s] a vehicle that has stood counts as moving from here: the noise is on both sides
     parked_after: float = 3.0  # [s] of standing before the ego leaves its lane for a vehicle or person
     queue_reach: float = 30.0  # [m] before a stop line, a vehicle that stands may be waiting
     queue_gap: float = 12.0  # [m] to the next vehicle ahead, a vehicle that stands may be waiting

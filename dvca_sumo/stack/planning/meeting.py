@@ -70,9 +70,9 @@ class Meetings:
                 return self._cut_in(row, graph, scene, profile)
             if entry > PRESENT and scene.speeds[owner] / (2.0 * entry) < config.expected_braking:
                 return None
-        margin = config.pass_margin if others_first else config.pass_margin_prior
-        if scene.ids[owner] in self._passing:
-            margin -= config.pass_hold
+        margin = config.pass_margin_prior
+        if others_first:
+            margin = config.pass_margin - (config.pass_hold if scene.ids[owner] in self._passing else 0.0)
         if margin < config.pass_margin and self._passes([row], graph, scene, profile, margin)[0]:
             return None
         stop = self._stop(row, graph, scene, views)

@@ -1,18 +1,23 @@
 """The path decision: around what stands in the way, on which side and by how much, or not at all."""
 
+from collections.abc import Container
+
 import msgspec
 import numpy as np
 
 from dvca_sumo.messages import Floats, ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
-from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length
-from dvca_sumo.stack.planning.reference import Window
+from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length, feasible_length
+from dvca_sumo.stack.planning.reference import BEHIND, Window
 from dvca_sumo.stack.planning.scene import Flags, Scene
 
+_PERSON, _STATIC = int(ObjectClass.PEDESTRIAN), int(ObjectClass.STATIC)
+_SEEN_LATE = 20.0  # [m] before the end of the window, objects are not yet decided about
 _ALONG = 1.0  # [m] kept lengthwise around an object before the ego moves back
 _IN_LANE = 1.2  # [m] vehicles whose centre is this near the line are in our lane, not parked beside it
 _OVER_LINE = 0.1  # [m] over the lane marking is not yet another lane
+_COMMITTED = 0.5  # of the offset: from there on it is safer to go on than to go back
 _SLOWEST = 3.0  # [m/s] assumed of the ego when it passes
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane
 _CLOSING = 2.0  # [s] of closing speed kept to those who come from behind
@@ -33,12 +38,24 @@ class Nudge(msgspec.Struct, frozen=True):
 class _Blocker(msgspec.Struct, frozen=True):
     """A standing object in or close to the way, in window coordinates."""
 
-    row: int
+    track: int
+    row: int  # in the scene
     low: float  # [m] stations
     high: float  # [m]
     right: float  # [m] offsets
     left: float  # [m]
     wanted: float  # [m] sideways clearance
+
+
+class Situation(msgspec.Struct, frozen=True, eq=False):
+    """What the path decision of one cycle looks at."""
+
+    time: float  # [s]
+    speed: float  # [m/s] of the ego
+    lateral: Lateral
+    window: Window
+    scene: Scene
+    views: list[LineView]
 
 
 class NudgeDecider:
@@ -49,33 +66,52 @@ class NudgeDecider:
         self._config = config
         self._half = 0.5 * shape.width
         self._since: dict[int, float] = {}  # by track: when it came to stand
-        self._held: dict[int, float] = {}  # by track: offset of the last cycle
+        self._held: dict[int, Plateau] = {}  # by track: the last cycle's, in route stations
 
-    def step(
-        self, time: float, speed: float, lateral: Lateral, window: Window, scene: Scene, views: list[LineView]
-    ) -> list[Nudge]:
+    @property
+    def stood(self) -> Container[int]:
+        """The tracks that stood in the last cycle."""
+        return self._since
+
+    def step(self, situation: Situation) -> list[Nudge]:
         """The nudges of this cycle by station; objects without one are passed by staying in lane, or stopped for."""
+        scene, station = situation.scene, situation.window.station
         standing = [scene.ids[row] for row in np.flatnonzero(scene.is_standing).tolist()]
-        self._since = {track: self._since.get(track, time) for track in standing}
+        self._since = {track: self._since.get(track, situation.time) for track in standing}
         nudges = []
-        for blocker in self._blockers(scene, window):
-            offset = self._offset(blocker, time, speed, lateral, window, scene, views)
+        for blocker in self._blockers(scene, situation.window):
+            offset = self._offset(blocker, situation)
             if offset is not None:
-                begin = blocker.low - self._shape.front - _ALONG
-                end = blocker.high + self._shape.rear_overhang + _ALONG
-                nudges.append(Nudge(scene.ids[blocker.row], Plateau(begin, end, offset)))
-        self._held = {nudge.track: nudge.plateau.offset for nudge in nudges}
+                nudges.append(Nudge(blocker.track, self._plateau(blocker, offset, situation)))
+        self._held = {
+            nudge.track: Plateau(station + begin, station + end, offset)
+            for nudge in nudges
+            for begin, end, offset in (nudge.plateau,)
+        }
         return nudges
+
+    def _plateau(self, blocker: _Blocker, offset: float, situation: Situation) -> Plateau:
+        """Where the offset has to be reached and left; a move once begun later than that ends where it did before."""
+        begin = blocker.low - self._shape.front - _ALONG
+        end = blocker.high + self._shape.rear_overhang + _ALONG
+        held = self._held.get(blocker.track)
+        if held is not None and held.offset == offset:
+            begin = max(begin, held.begin - situation.window.station)
+        else:
+            begin = max(begin, feasible_length(situation.lateral, offset, begin, situation.speed, self._config))
+        return Plateau(begin, max(end, begin), offset)
 
     def _blockers(self, scene: Scene, window: Window) -> list[_Blocker]:
         """Standing objects that the ego, centred in its lane, would pass with less than the wanted clearance."""
         now, config = scene.now, self._config
-        wanted = np.where(scene.classes == ObjectClass.PEDESTRIAN, config.person_clearance, config.nudge_clearance)
-        near = scene.is_standing & (np.abs(now.offsets) < self._half + wanted + now.half_widths)
+        wanted = np.where(scene.classes == _PERSON, config.person_clearance, config.nudge_clearance)
+        wanted_now = wanted + [config.nudge_hold if track in self._held else 0.0 for track in scene.ids]
+        near = scene.is_standing & (np.abs(now.offsets) < self._half + wanted_now + now.half_widths)
         near &= now.stations + now.half_lengths > -self._shape.rear_overhang - _ALONG
-        near &= now.stations - now.half_lengths < window.rows.shape[1] - 40
+        near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
         blockers = [
             _Blocker(
+                scene.ids[row],
                 row,
                 float(now.stations[row] - now.half_lengths[row]),
                 float(now.stations[row] + now.half_lengths[row]),
@@ -87,31 +123,25 @@ class NudgeDecider:
         ]
         return sorted(blockers, key=lambda blocker: blocker.low)
 
-    def _offset(
-        self,
-        blocker: _Blocker,
-        time: float,
-        speed: float,
-        lateral: Lateral,
-        window: Window,
-        scene: Scene,
-        views: list[LineView],
-    ) -> float | None:
-        """The offset to pass at: on the side of the last cycle if that still works, else the smaller one."""
+    def _offset(self, blocker: _Blocker, situation: Situation) -> float | None:
+        """The offset to pass at: on the side of the last cycle if that still works, else the smaller one.
+
+        None where there is no way round, or where none is needed.
+        """
+        window = situation.window
         span = window.span(blocker.low - self._shape.front, blocker.high + self._shape.rear_overhang)
-        held = self._held.get(scene.ids[blocker.row], 0.0)
+        lane_left = float(window.lane_left[span].min()) + _OVER_LINE
+        lane_right = float(window.lane_right[span].max()) - _OVER_LINE
+        held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
         offsets = self._candidates(blocker, window, span)
         for offset in sorted(offsets, key=lambda offset: (offset * held <= 0.0, abs(offset))):
-            if self._meets_another(blocker, offset, scene):
-                continue
-            over_left = offset + self._half > window.lane_left[span].min() + _OVER_LINE
-            over_right = offset - self._half < window.lane_right[span].max() - _OVER_LINE
-            if (over_left or over_right) and not self._may_leave_lane(
-                blocker, offset, time, speed, lateral, scene, views
+            stays_in_lane = lane_right + self._half <= offset <= lane_left - self._half
+            if self._meets_another(blocker, offset, situation.scene) or not (
+                stays_in_lane or self._may_leave_lane(blocker, offset, situation)
             ):
                 continue
             is_same = abs(offset - held) < self._config.nudge_hold and self._clears(blocker, held)
-            return held if is_same else offset
+            return (held if is_same else offset) or None
         return None
 
     def _candidates(self, blocker: _Blocker, window: Window, span: slice) -> list[float]:
@@ -119,9 +149,9 @@ class NudgeDecider:
         room = self._half + self._config.edge_clearance
         leftmost = float(window.road_left[span].min()) - room
         rightmost = float(window.road_right[span].max()) + room
-        left = min(blocker.left + self._half + blocker.wanted, leftmost)
-        right = max(blocker.right - self._half - blocker.wanted, rightmost)
-        return [offset for offset in (left, right) if self._clears(blocker, offset) and abs(offset) > 1e-3]
+        left = min(max(blocker.left + self._half + blocker.wanted, 0.0), leftmost)
+        right = max(min(blocker.right - self._half - blocker.wanted, 0.0), rightmost)
+        return [offset for offset in (left, right) if self._clears(blocker, offset)]
 
     def _clears(self, blocker: _Blocker, offset: float) -> bool:
         least = self._half + self._config.nudge_clearance_least
@@ -137,49 +167,44 @@ class NudgeDecider:
         reach = now.half_widths + (self._half + self._config.nudge_clearance_least - 1e-6)
         return bool((alongside & (np.abs(now.offsets - offset) < reach)).any())
 
-    def _may_leave_lane(
-        self,
-        blocker: _Blocker,
-        offset: float,
-        time: float,
-        speed: float,
-        lateral: Lateral,
-        scene: Scene,
-        views: list[LineView],
-    ) -> bool:
+    def _may_leave_lane(self, blocker: _Blocker, offset: float, situation: Situation) -> bool:
         """For what will not move by itself, when the other lane is free; always to finish what was begun."""
-        if lateral.offset / offset > 0.5 and self._held.get(scene.ids[blocker.row], 0.0) * offset > 0.0:
+        if blocker.track in self._held and situation.lateral.offset / offset > _COMMITTED:
             return True
-        if scene.classes[blocker.row] != ObjectClass.STATIC:
-            parked = time - self._since[scene.ids[blocker.row]] >= self._config.parked_after
-            if not parked or self._is_queueing(blocker, scene, views):
+        if situation.scene.classes[blocker.row] != _STATIC:
+            stood = situation.time - self._since[blocker.track]
+            if stood < self._config.parked_after or self._is_queueing(blocker, situation):
                 return False
-        length = blend_length(offset, speed, self._config)
+        length = blend_length(offset, situation.speed, self._config)
         band = (blocker.low - self._shape.front - length, blocker.high + length)
-        return self._is_free(offset, band, speed, scene)
+        return self._is_free(offset, band, situation.speed, situation.scene)
 
-    def _is_queueing(self, blocker: _Blocker, scene: Scene, views: list[LineView]) -> bool:
+    def _is_queueing(self, blocker: _Blocker, situation: Situation) -> bool:
         """A vehicle in our lane may just wait, however long it has stood: near a line, or behind one that waits."""
-        now = scene.now
-        is_vehicle = scene.classes != ObjectClass.PEDESTRIAN
-        is_vehicle &= scene.classes != ObjectClass.STATIC
+        scene, now = situation.scene, situation.scene.now
+        is_vehicle = (scene.classes != _PERSON) & (scene.classes != _STATIC)
         in_lane = is_vehicle & (np.abs(now.offsets) < _IN_LANE)
         if not in_lane[blocker.row]:
             return False
         lows, highs = now.stations - now.half_lengths, now.stations + now.half_lengths
         nose = blocker.high
-        while True:
-            for view in views:
-                to_line = view.distance + self._shape.front - nose
-                if to_line < self._config.queue_reach and view.line.exit_station - view.line.station > -to_line:
-                    return True
+        while not self._is_near_line(nose, situation.views):
             ahead = np.flatnonzero(in_lane & (lows > nose) & (lows < nose + self._config.queue_gap))
             if not len(ahead):
                 return False
-            next_ahead = ahead[lows[ahead].argmin()]
-            if not scene.is_standing[next_ahead]:
+            nearest = ahead[lows[ahead].argmin()]
+            if not scene.is_standing[nearest]:
                 return True
-            nose = float(highs[next_ahead])
+            nose = float(highs[nearest])
+        return True
+
+    def _is_near_line(self, station: float, views: list[LineView]) -> bool:
+        """Whether the place lies on a junction or shortly before its stop line."""
+        for line, distance, _, _ in views:
+            to_line = distance + self._shape.front - station
+            if line.station - line.exit_station < to_line < self._config.queue_reach:
+                return True
+        return False
 
     def _is_free(self, offset: float, band: tuple[float, float], speed: float, scene: Scene) -> bool:
         """Whether nobody who moves comes alongside while the ego is out of its lane."""
@@ -190,7 +215,8 @@ class NudgeDecider:
         ego: Floats = pace * scene.times
         out: Flags = (ego > band[0]) & (ego < band[1])
         stations, lengths = futures.stations[moving], futures.half_lengths[moving]
-        beside = np.abs(futures.offsets[moving] - offset) < futures.half_widths[moving] + self._half + 0.3
+        room = self._half + self._config.object_margin
+        beside = np.abs(futures.offsets[moving] - offset) < futures.half_widths[moving] + room
         rates = (stations[:, -1:] - stations[:, :1]) / (scene.times[-1] - scene.times[0])
         behind = self._shape.rear_overhang + _BAND_GAP + _CLOSING * np.maximum(rates - pace, 0.0)
         beside &= (stations + lengths > ego - behind) & (stations - lengths < ego + self._shape.front + _BAND_GAP)

@@ -15,10 +15,14 @@ from dvca_sumo.stack.planning.start import StartState
 
 _PEAK = 5.7735  # highest second derivative of a minimum-jerk blend of size 1 over length 1: 10 / sqrt(3)
 _SHORTEST_BLEND = 6.0  # [m]
-_STEEPEST = 0.6  # tangent of the largest angle between path and reference line
+_SHORTEST_REST = 1.0  # [m] of a move that is nearly done
+_STRETCH = 1.1
+_TOLERANCE = 1.1  # of curvature, so that a move found feasible is found so again from every point on it
+_SAMPLES = (0.15, 0.3, 0.5, 0.7, 0.85)
+_STEEPEST = 0.55  # [rad] largest angle between path and reference line
 _SHARPEST = 0.25  # [1/m] largest initial second derivative taken over from the start state
 _UNDERWAY = 1.5  # of a move's length: a move begun early, because the ego was faster then, is not taken back
-_FADE = 5.0  # [m] over which what projection left of the start position is blended out
+_FADE: Floats = np.exp(np.arange(30) / -5.0)  # by station: how much is left of what projection missed the start by
 
 
 class Plateau(NamedTuple):
@@ -35,6 +39,9 @@ class Lateral(NamedTuple):
     offset: float  # [m]
     slope: float
     bend: float  # [1/m]
+
+
+_CENTRED = Lateral(0.0, 0.0, 0.0)
 
 
 class Path(msgspec.Struct, frozen=True, eq=False):
@@ -54,7 +61,7 @@ def lateral_start(start: StartState, window: Window, offset: float) -> Lateral:
     curvature = float(window.curvatures[BEHIND])
     scale = max(1.0 - curvature * offset, 0.2)
     angle = math.remainder(start.heading - float(window.headings[BEHIND]), 2.0 * math.pi)
-    tangent = min(max(math.tan(angle), -_STEEPEST), _STEEPEST) if abs(angle) < 1.2 else 0.0
+    tangent = math.tan(min(max(angle, -_STEEPEST), _STEEPEST))
     cosine = 1.0 / math.hypot(1.0, tangent)
     bend = (start.curvature * scale / cosine - curvature) * scale / (cosine * cosine)
     return Lateral(offset, scale * tangent, min(max(bend, -_SHARPEST), _SHARPEST))
@@ -64,6 +71,20 @@ def blend_length(shift: float, speed: float, config: PlanningConfig) -> float:
     """How long a sideways move of `shift` [m] has to be for comfort at `speed`, and for the steering [m]."""
     sharpest = min(config.curvature, config.shift_acceleration / max(speed * speed, 0.1))
     return max(_SHORTEST_BLEND, math.sqrt(_PEAK * abs(shift) / sharpest))
+
+
+def feasible_length(state: Lateral, target: float, length: float, speed: float, config: PlanningConfig) -> float:
+    """`length` [m] of a move from `state` to `target`, or more where tyres or steering could not follow it."""
+    sharpest = min(config.curvature, config.hard_shift_acceleration / max(speed * speed, 0.1))
+    sharpest = max(_TOLERANCE * sharpest, abs(state.bend))
+    length = max(length, _SHORTEST_REST)
+    while True:
+        first, second = state.slope * length, 0.5 * state.bend * length * length
+        third, fourth, fifth = _upper_terms(target - state.offset, first, second)
+        peak = max(abs(2.0 * second + u * (6.0 * third + u * (12.0 * fourth + u * 20.0 * fifth))) for u in _SAMPLES)
+        if peak <= sharpest * length * length:
+            return length
+        length *= _STRETCH
 
 
 def path_along(
@@ -81,9 +102,9 @@ def path_along(
     cosines, sines, curvatures = window.cosines[ahead], window.sines[ahead], window.curvatures[ahead]
     x = window.x[ahead] - offsets * sines
     y = window.y[ahead] + offsets * cosines
-    fade = np.exp(np.arange(count) / -_FADE)
-    x += (start.x - x[0]) * fade
-    y += (start.y - y[0]) * fade
+    faded = len(_FADE)
+    x[:faded] += (start.x - x[0]) * _FADE
+    y[:faded] += (start.y - y[0]) * _FADE
     scale = 1.0 - curvatures * offsets
     tangents = slopes / scale
     squared_cosines = 1.0 / (1.0 + tangents * tangents)
@@ -128,22 +149,25 @@ def _blends(
     it gives the same curve. The ego returns to its lane between plateaus where that takes less than the way.
     """
     blends: list[tuple[float, float, float]] = []
-    position, offset = 0.0, lateral.offset
+    position, offset, state = 0.0, lateral.offset, lateral
     unsettled = abs(lateral.offset) + 4.0 * abs(lateral.slope)
     for plateau in plateaus:
         length = blend_length(max(abs(plateau.offset - offset), unsettled), speed, config)
         back = blend_length(max(abs(offset), unsettled), speed, config)
+        back = feasible_length(state, 0.0, back, speed, config)
         is_underway = not blends and offset * plateau.offset > 0.0
         if plateau.begin - (_UNDERWAY * length if is_underway else length) > position + back:
             blends.append((position, position + back, 0.0))
             position, offset, unsettled = position + back, 0.0, 0.0
+            state = _CENTRED
             length = blend_length(plateau.offset, speed, config)
         begin = max(position, plateau.begin - length) if blends else position
-        shortest = blend_length(max(abs(plateau.offset - offset), unsettled), 0.0, config)
-        reached = max(plateau.begin, begin + shortest)
+        reached = begin + feasible_length(state, plateau.offset, plateau.begin - begin, speed, config)
         blends.append((begin, reached, plateau.offset))
         position, offset, unsettled = max(plateau.end, reached), plateau.offset, 0.0
+        state = Lateral(offset, 0.0, 0.0)
     back = blend_length(max(abs(offset), unsettled), speed, config)
+    back = feasible_length(state, 0.0, back, speed, config)
     blends.append((position, position + back, 0.0))
     return blends
 
@@ -153,16 +177,21 @@ def _blend(
 ) -> tuple[Floats, Floats, Floats]:
     """The quintic of least jerk from `state` to rest at `target` after `length`, at distances `along`."""
     first, second = state.slope * length, 0.5 * state.bend * length * length
-    gap = target - state.offset - first - second
-    slope_gap, bend_gap = -first - 2.0 * second, -2.0 * second
-    third = 10.0 * gap - 4.0 * slope_gap + 0.5 * bend_gap
-    fourth = -15.0 * gap + 7.0 * slope_gap - bend_gap
-    fifth = 6.0 * gap - 3.0 * slope_gap + 0.5 * bend_gap
+    third, fourth, fifth = _upper_terms(target - state.offset, first, second)
     u = along / length
     offsets = state.offset + u * (first + u * (second + u * (third + u * (fourth + u * fifth))))
     slopes = (first + u * (2.0 * second + u * (3.0 * third + u * (4.0 * fourth + u * (5.0 * fifth))))) / length
     bends = (2.0 * second + u * (6.0 * third + u * (12.0 * fourth + u * (20.0 * fifth)))) / (length * length)
     return offsets, slopes, bends
+
+
+def _upper_terms(rise: float, first: float, second: float) -> tuple[float, float, float]:
+    """Coefficients of u^3, u^4, u^5 of a quintic that rises by `rise` from u = 0 to rest at u = 1."""
+    gap = rise - first - second
+    slope_gap, bend_gap = -first - 2.0 * second, -2.0 * second
+    third = 10.0 * gap - 4.0 * slope_gap + 0.5 * bend_gap
+    fourth = -15.0 * gap + 7.0 * slope_gap - bend_gap
+    return third, fourth, 6.0 * gap - 3.0 * slope_gap + 0.5 * bend_gap
 
 
 def _swept(offsets: Floats, slopes: Floats, curvatures: Floats, shape: VehicleShape) -> tuple[Floats, Floats]:
@@ -172,9 +201,10 @@ def _swept(offsets: Floats, slopes: Floats, curvatures: Floats, shape: VehicleSh
     left[:BEHIND], right[:BEHIND] = offsets[0] + half, offsets[0] - half
     halves = half * np.sqrt(1.0 + slopes * slopes)
     left[BEHIND:], right[BEHIND:] = offsets + halves, offsets - halves
+    sides = left[BEHIND:].copy(), right[BEHIND:].copy()
     for ahead in range(1, math.ceil(shape.front) + 1):
-        axis = offsets + ahead * slopes - (0.5 * ahead * ahead) * curvatures
+        turned = (slopes - (0.5 * ahead) * curvatures) * ahead
         part = slice(BEHIND + ahead, None)
-        np.maximum(left[part], (axis + halves)[:-ahead], out=left[part])
-        np.minimum(right[part], (axis - halves)[:-ahead], out=right[part])
+        np.maximum(left[part], (sides[0] + turned)[:-ahead], out=left[part])
+        np.minimum(right[part], (sides[1] + turned)[:-ahead], out=right[part])
     return left, right

@@ -8,35 +8,29 @@ from dvca_sumo.messages import (
     TRAJECTORY_TIMES,
     Floats,
     LocalizationEstimate,
-    ObjectClass,
     PredictedObjects,
     SignalColour,
     Trajectory,
     VehicleShape,
 )
-from dvca_sumo.roadmap.route import Control, Route
+from dvca_sumo.roadmap.route import Route
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import Junctions, LineView
+from dvca_sumo.stack.planning.limits import nearest_stop, speed_caps
 from dvca_sumo.stack.planning.meeting import Demand, Meetings
-from dvca_sumo.stack.planning.nudging import Nudge, NudgeDecider
+from dvca_sumo.stack.planning.nudging import Nudge, NudgeDecider, Situation
 from dvca_sumo.stack.planning.path import Path, lateral_start, path_along
-from dvca_sumo.stack.planning.reference import BEHIND, Reference, Window
+from dvca_sumo.stack.planning.reference import Reference, Window
 from dvca_sumo.stack.planning.scene import Scene, scene_in
-from dvca_sumo.stack.planning.speed import Leader, Profile, Stop, roll_out, slowed_before
+from dvca_sumo.stack.planning.speed import Profile, Stop, roll_out
 from dvca_sumo.stack.planning.st_graph import Graph, graph_of, leader_of, leading
 from dvca_sumo.stack.planning.start import StartState, start_state
 
-_PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
-_PRIORITY = Control.PRIORITY
 _HORIZON = float(TRAJECTORY_TIMES[-1])  # [s]
 _SPARE = 30.0  # [m] of window beyond what can be driven within the horizon
-_LARGEST_ANGLE = 1.2  # [rad] to the reference line
+_LARGEST_ANGLE = 2.0  # [rad] to the reference line
+_ASTRAY = 0.3  # [rad] between ego and path
 _ROUNDS = 3  # of deciding about meetings: yielding to one may put the ego in the way of the next
-_GIVE_AT_DESTINATION = 1.0  # [m]
-_SLOW_FOR_PERSON = (3.0, 6.0)  # [m/s], [m/s per m of gap]
-_SLOW_FOR_OBJECT = (4.0, 10.0)  # [m/s], [m/s per m of gap]
-_SLOW_MOVER = 3.0  # [m/s] faster ones are not passed slowly
-_TIMID = 1.0  # [m/s] a leader slower than this may stop on the junction's exit
 
 
 class Planner:
@@ -96,10 +90,10 @@ class Planner:
         station, offset = located
         config, shape = self._config, self._shape
         window = self._reference.window(station, self._reach(station, start.speed))
-        scene = scene_in(window, predicted, time, config)
+        scene = scene_in(window, predicted, time, self._nudging.stood, config)
         views = self._junctions.step(time, station + shape.front, station - shape.rear_overhang, start.speed, signals)
         lateral = lateral_start(start, window, offset)
-        nudges = self._nudging.step(time, start.speed, lateral, window, scene, views)
+        nudges = self._nudging.step(Situation(time, start.speed, lateral, window, scene, views))
         path = path_along(window, start, lateral, [nudge.plateau for nudge in nudges], shape, config)
         graph = graph_of(scene, window, path, self._route.crossings, shape, config)
         profile = self._profile(start, window, path, scene, graph, views)
@@ -115,11 +109,15 @@ class Planner:
         self, start: StartState, window: Window, path: Path, scene: Scene, graph: Graph, views: list[LineView]
     ) -> Profile:
         """The fastest motion that all demands allow, found by adding demands until nobody else is in the way."""
-        caps = self._caps(window, path, scene, graph, views).tolist()
-        leaders, others = leading(graph, scene, self._shape, self._config)
-        leader = leader_of(leaders, graph, scene, self._shape)
-        stops = self._stops(window, scene, graph, views, leader)
-        profile = roll_out(start.speed, start.acceleration, caps, stops, leader, self._config)
+        config, shape = self._config, self._shape
+        caps = speed_caps(window, path, scene, graph, views, shape, config)
+        if abs(math.remainder(start.heading - float(path.headings[0]), 2.0 * math.pi)) > _ASTRAY:
+            caps = [min(cap, config.astray_speed) for cap in caps]
+        leaders, others = leading(graph, scene, shape, config)
+        leader = leader_of(leaders, graph, scene, shape)
+        to_destination = self._route.destination - window.station - shape.front
+        stops = [nearest_stop(to_destination, scene, graph, views, leader, shape, config)]
+        profile = roll_out(start.speed, start.acceleration, caps, stops, leader, config)
         demands: dict[int, Demand] = {}
         for _ in range(_ROUNDS):
             undecided = [row for row in others if row not in demands]
@@ -128,76 +126,12 @@ class Planner:
                 break
             demands.update((demand.row, demand) for demand in new)
             joining = [demand.row for demand in demands.values() if demand.follows]
-            leader = leader_of(leaders + joining, graph, scene, self._shape)
+            leader = leader_of(leaders + joining, graph, scene, shape)
             stops_now = [*stops, *_merged(demands, scene)]
-            profile = roll_out(start.speed, start.acceleration, caps, stops_now, leader, self._config)
+            profile = roll_out(start.speed, start.acceleration, caps, stops_now, leader, config)
         yielding = {int(scene.owners[row]) for row in demands}
         self._meetings.settle(scene.ids[scene.owners[row]] for row in others if scene.owners[row] not in yielding)
         return profile
-
-    def _caps(self, window: Window, path: Path, scene: Scene, graph: Graph, views: list[LineView]) -> Floats:
-        """Highest speed by metre of path [m/s]: limit, curves, passing close by, lines with duty to give way."""
-        config, shape = self._config, self._shape
-        caps = np.minimum(
-            config.cruise_fraction * window.speed_limits[BEHIND:],
-            np.sqrt(config.lateral_acceleration / np.maximum(np.abs(path.curvatures), 1e-4)),
-        )
-        for row, cap in _passing_speeds(scene, graph, config):
-            low, high = graph.low[row, 0] - shape.front, graph.high[row, 0] + shape.rear_overhang
-            if high > 0.0:
-                part = slice(max(int(low), 0), int(high) + 1)
-                caps[part] = np.minimum(caps[part], cap)
-        for line, distance, _, gives_way in views:
-            if gives_way and line.yields_to and distance > 0.0 and line.control is not _PRIORITY:
-                part = slice(int(distance), int(distance) + 2)
-                caps[part] = np.minimum(caps[part], config.give_way_speed)
-        return slowed_before(caps, path.arcs, config.slowing)
-
-    def _stops(
-        self, window: Window, scene: Scene, graph: Graph, views: list[LineView], leader: Leader | None
-    ) -> list[Stop]:
-        """Where the ego has to stop whatever anybody does; only the nearest matters."""
-        config, front = self._config, self._shape.front
-        to_destination = self._route.destination - window.station - front
-        stops = [Stop(to_destination, _GIVE_AT_DESTINATION, "stop destination")]
-        stops += [
-            Stop(view.distance - config.stop_line_gap, config.stop_line_gap, view.stop) for view in views if view.stop
-        ]
-        obstacle = _obstacle(scene, graph, front)
-        occupied_from = math.inf
-        if obstacle is not None:
-            occupied_from = float(graph.low[obstacle, 0]) - front
-            label = f"stop behind {scene.ids[scene.owners[obstacle]]}"
-            stops.append(Stop(occupied_from - config.object_gap, config.object_gap - 1.0, label))
-        if leader is not None and max(leader.speeds[0], leader.speeds[15]) < _TIMID:
-            occupied_from = min(occupied_from, leader.rears[0])
-        needed = self._shape.length + config.follow_gap
-        for line, distance, _, _ in views:
-            to_exit = distance + line.exit_station - line.station
-            if line.crosses and distance > 0.0 and to_exit < occupied_from < to_exit + needed:
-                stops.append(Stop(distance - config.stop_line_gap, config.stop_line_gap, "stop exit occupied"))
-        return [min(stops, key=lambda stop: stop.at)]
-
-
-def _obstacle(scene: Scene, graph: Graph, front: float) -> int | None:
-    """The nearest future that stands in the way, as a row; not one that the front bumper has cleared already."""
-    rows = np.arange(scene.moving, len(scene.owners))
-    standing = graph.occupied[rows, 0] & ((graph.low[rows, 0] > front) | (graph.gaps[rows, 0] < 0.0))
-    rows = rows[standing]
-    return int(rows[graph.low[rows, 0].argmin()]) if len(rows) else None
-
-
-def _passing_speeds(scene: Scene, graph: Graph, config: PlanningConfig) -> list[tuple[int, float]]:
-    """Futures that are passed close by now, as rows, and at which speed [m/s]."""
-    owners, gaps = scene.owners, graph.gaps[:, 0]
-    is_person = scene.classes[owners] == _PERSON
-    close = (gaps >= 0.0) & (gaps < np.where(is_person, config.person_slow_gap, config.object_slow_gap))
-    close &= scene.is_standing[owners] | ((scene.speeds[owners] < _SLOW_MOVER) & (scene.classes[owners] != _VEHICLE))
-    speeds = []
-    for row in np.flatnonzero(close).tolist():
-        slowest, more = _SLOW_FOR_PERSON if is_person[row] else _SLOW_FOR_OBJECT
-        speeds.append((row, slowest + more * float(gaps[row])))
-    return speeds
 
 
 def _merged(demands: dict[int, Demand], scene: Scene) -> list[Stop]:

@@ -1,5 +1,7 @@
 """Predicted objects in the coordinates of the window: where each may be, and when."""
 
+from collections.abc import Container
+
 import msgspec
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +12,8 @@ from dvca_sumo.stack.planning.reference import BEHIND, Window
 
 Flags = npt.NDArray[np.bool_]
 
+_PERSON, _STATIC = int(ObjectClass.PEDESTRIAN), int(ObjectClass.STATIC)
+_SPARSE = 4  # every so many times of a hypothesis do to bound it
 _AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
 
 
@@ -39,14 +43,20 @@ class Scene(msgspec.Struct, frozen=True, eq=False):
     moving: int  # the first `moving` futures move, the others stay where they are
 
 
-def scene_in(window: Window, predicted: PredictedObjects, time: float, config: PlanningConfig) -> Scene:
+def scene_in(
+    window: Window, predicted: PredictedObjects, time: float, stood: Container[int], config: PlanningConfig
+) -> Scene:
     """All objects with their futures at `time` [s] and after.
 
-    A standing object gets the one future of staying: its heading is no intention, and its noise no motion.
+    `stood`: the tracks that stood in the last cycle. A standing object gets the one future of staying:
+    its heading is no intention, and its noise no motion.
     """
     objects = predicted.objects
     speeds = np.hypot(objects.velocities[:, 0], objects.velocities[:, 1])
-    standing = (objects.classes == ObjectClass.STATIC) | (speeds < config.standing_speed)
+    ids: list[int] = objects.ids.tolist()
+    slowest = [config.moving_speed if track in stood else config.standing_speed for track in ids]
+    standing = (objects.classes == _STATIC) | (speeds < slowest)
+    standing &= (objects.classes != _PERSON) | (speeds < config.standing_speed)
     counts = predicted.probabilities >= config.possible
     counts &= ~standing[predicted.owners]
     rows = np.flatnonzero(counts)
@@ -57,7 +67,7 @@ def scene_in(window: Window, predicted: PredictedObjects, time: float, config: P
     now, moving = _extents(window, objects.boxes, poses, predicted.owners[rows])
     still = np.flatnonzero(stays)
     return Scene(
-        ids=objects.ids.tolist(),
+        ids=ids,
         classes=objects.classes,
         speeds=speeds,
         is_standing=standing,
@@ -76,7 +86,7 @@ def _is_around(window: Window, poses: Floats) -> Flags:
     ahead = slice(BEHIND, None)
     around = np.ones(len(poses), dtype=np.bool_)
     for axis, line in enumerate((window.x[ahead], window.y[ahead])):
-        values = poses[:, :, axis]
+        values = poses[:, ::_SPARSE, axis]
         around &= (values.max(axis=1) > line.min() - _AROUND) & (values.min(axis=1) < line.max() + _AROUND)
     return around
 

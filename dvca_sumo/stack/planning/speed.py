@@ -92,9 +92,11 @@ def roll_out(
     s, v, a = 0.0, speed, acceleration
     arcs, speeds, accelerations = [s], [v], [a]
     last, label = len(caps) - 1, ""
+    highest, lowest = config.acceleration, -config.comfort_braking
     for k in range(STEPS):
-        free = (caps[min(int(s + v * _LOOK_AHEAD), last)] - v) / _LOOK_AHEAD
-        free = min(max(free, -config.comfort_braking), config.acceleration)
+        metre = int(s + v * _LOOK_AHEAD)
+        free = (caps[min(metre, last)] - v) / _LOOK_AHEAD
+        free = highest if free > highest else max(free, lowest)
         wanted, because = free, ""
         for stop in stops:
             allowed = _for_stop(stop, s, v, k * STEP, config)
@@ -114,11 +116,13 @@ def roll_out(
 
 
 def _for_stop(stop: Stop, s: float, v: float, time: float, config: PlanningConfig) -> float:
-    """The gentler of stopping there and, when the way becomes free, of arriving no earlier than that."""
+    """Stopping there or, where the ego need not stop to arrive no earlier than the way becomes free, that."""
     left = stop.until - time
     if left <= 0.0:
         return config.acceleration
     distance = stop.at - s
+    if 2.0 * distance > v * left:
+        return 2.0 * (distance - v * left) / (left * left)
     if v < _HOLD_SPEED and distance < _HOLD_GAP:
         allowed = _HOLD
     elif distance > _TOUCH:
@@ -129,8 +133,6 @@ def _for_stop(stop: Stop, s: float, v: float, time: float, config: PlanningConfi
     if allowed < -config.comfort_braking:
         firmest = _FIRMER * v * v / (2.0 * max(distance + stop.give, _TOUCH))
         allowed = max(allowed, -max(config.comfort_braking, firmest))
-    if left < math.inf:
-        allowed = max(allowed, 2.0 * (distance - v * left) / (left * left))
     return allowed
 
 

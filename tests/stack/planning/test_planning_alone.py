@@ -2,11 +2,12 @@
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from planned_drives import LIMIT, Drive, assert_drivable, curve_points, drive, road, stop_line
 
-from dvca_sumo.messages import SignalColour
+from dvca_sumo.messages import Floats, SignalColour
 from dvca_sumo.roadmap.route import Control, Route
 
 
@@ -29,8 +30,8 @@ def test_a_lower_limit_is_kept_from_where_the_front_bumper_enters_it() -> None:
     assert driven.speeds[~inside].max() > 13.0
 
 
-def _with_limits(route: Route, limits: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Route:
-    return type(route)(**{**{name: getattr(route, name) for name in route.__struct_fields__}, "speed_limits": limits})
+def _with_limits(route: Route, limits: Floats) -> Route:
+    return msgspec.structs.replace(route, speed_limits=limits)
 
 
 @pytest.mark.parametrize("radius", [10.0, 25.0])
@@ -112,7 +113,10 @@ def test_green_that_goes_out_of_view_is_remembered_for_a_moment() -> None:
     driven = at_signal({0.0: SignalColour.GREEN})
     route = road(stop_lines=[stop_line(120.0, Control.SIGNAL)])
     blinded = drive(
-        route, 12.0, speed=13.0, signals=lambda time: {"J/2": SignalColour.GREEN} if driven.fronts[int(time * 10)] < 105.0 else {}
+        route,
+        12.0,
+        speed=13.0,
+        signals=lambda time: {"J/2": SignalColour.GREEN} if driven.fronts[int(time * 10)] < 105.0 else {},
     )
     assert blinded.speeds.min() > 12.9
 

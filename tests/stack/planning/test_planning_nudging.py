@@ -1,10 +1,13 @@
 """Around what stands in the way."""
 
+import math
+
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import SHAPE, Drive, assert_drivable, car, cone, drive, person, road, stop_line
+from planned_drives import SHAPE, Actor, Drive, assert_drivable, car, cone, drive, person, road, stop_line
 
+from dvca_sumo.messages import ObjectClass
 from dvca_sumo.roadmap.route import Control
 
 
@@ -109,15 +112,25 @@ def test_object_on_the_left_is_passed_on_the_right() -> None:
 
 
 def test_side_does_not_change_while_the_object_seems_to_move_about() -> None:
-    class Wobbling(type(cone(5, 120.0))):  # type: ignore[misc]
+    class Wobbling(Actor, frozen=True):
         def box_at(self, time: float) -> list[float]:
             return [120.0, 0.15 * np.sin(37.0 * time), 0.0, 0.4, 0.4]
 
     route = road(lanes_left=1)
     wide = msgspec.structs.replace(route, road_right=route.road_right - 3.2)
-    seen = Wobbling(*msgspec.structs.astuple(cone(5, 120.0)))
+    seen = Wobbling(5, ObjectClass.STATIC, 120.0, 0.0)
     driven = drive(wide, 9.0, speed=13.0, actors=[seen])
     assert len({decision for decision in driven.decisions if decision.startswith("nudge")}) == 1
+
+
+def test_standing_car_whose_measured_speed_flickers_is_passed_all_the_same() -> None:
+    class Flickering(Actor, frozen=True):
+        def speed_at(self, time: float) -> float:
+            return 0.4 + 0.3 * math.sin(41.0 * time)
+
+    driven = drive(road(lanes_left=1), 30.0, speed=10.0, actors=[Flickering(5, ObjectClass.VEHICLE, 80.0, 0.0)])
+    assert driven.clearances.min() >= 0.4
+    assert driven.fronts[-1] > 150.0
 
 
 def test_person_who_stands_in_the_lane_is_passed_with_more_clearance() -> None:

@@ -2,12 +2,14 @@
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
-from planned_drives import SHAPE, assert_drivable, car, cone, drive, person, road, stop_line
+from planned_drives import SHAPE, assert_drivable, believed, car, drive, person, predicted, road, stop_line
 
 from dvca_sumo.messages import SignalColour
 from dvca_sumo.roadmap.route import Control, Crossing
+from dvca_sumo.stack.planning import Planner, PlanningConfig
 
 UP, DOWN = math.pi / 2.0, -math.pi / 2.0
 
@@ -118,10 +120,6 @@ def test_person_about_to_use_a_crossing_is_waited_for_before_it() -> None:
     assert driven.fronts[-1] > 120.0
 
 
-def crossing_car(**changes: object) -> object:
-    return car(3, 106.0, -80.0, heading=UP, speed=10.0, **changes)
-
-
 def test_car_with_priority_from_a_side_road_is_yielded_to() -> None:
     driven = drive(
         road(stop_lines=[stop_line(100.0, Control.YIELD)]),
@@ -150,7 +148,7 @@ def test_car_that_has_to_wait_is_passed() -> None:
         road(stop_lines=[stop_line(100.0, Control.PRIORITY, yields_to=frozenset())]),
         20.0,
         speed=13.0,
-        actors=[car(3, 106.0, -80.0, heading=UP, speed=10.0, stays_from=7.0, lanes=("minor_0",))],
+        actors=[car(3, 106.0, -80.0, heading=UP, speed=10.0, stays_from=6.0, lanes=("minor_0",))],
     )
     assert driven.speeds.min() > 12.9
 
@@ -192,27 +190,17 @@ def test_junction_is_not_entered_while_its_exit_is_occupied() -> None:
 
 
 def test_unlikely_future_is_ignored_and_a_likely_one_is_not() -> None:
-    from planned_drives import believed, predicted  # noqa: PLC0415
-
-    import msgspec  # noqa: PLC0415
-
-    from dvca_sumo.stack.planning import Planner, PlanningConfig  # noqa: PLC0415
-
     crossing = predicted([person(3, 60.0, -6.0, heading=UP, speed=1.4)], 0.0)
     decisions = {}
     for chance in (0.1, 0.5):
         future = msgspec.structs.replace(crossing, probabilities=np.array([chance]))
-        decisions[chance] = Planner(PlanningConfig(), road(), SHAPE).step(believed(5.0, speed=12.0), future, {}).decision
+        decisions[chance] = (
+            Planner(PlanningConfig(), road(), SHAPE).step(believed(5.0, speed=12.0), future, {}).decision
+        )
     assert decisions == {0.1: "cruise", 0.5: "yield 3"}
 
 
 def test_object_without_a_future_stays_where_it_is() -> None:
-    from planned_drives import believed, predicted  # noqa: PLC0415
-
-    import msgspec  # noqa: PLC0415
-
-    from dvca_sumo.stack.planning import Planner, PlanningConfig  # noqa: PLC0415
-
     unknown = msgspec.structs.replace(
         predicted([car(3, 30.0, speed=5.0)], 0.0),
         owners=np.array([], dtype=np.int64),

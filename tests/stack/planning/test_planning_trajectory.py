@@ -52,6 +52,13 @@ def test_ego_beside_its_lane_is_led_back_to_it() -> None:
     assert np.abs(points[:, 6]).max() < 0.15
 
 
+def test_ego_that_points_away_from_the_line_is_led_back_slowly() -> None:
+    points = planner().step(believed(50.0, 6.0, 1.5, 5.0), NOBODY, {}).points
+    assert points[-1, 4] < PlanningConfig().astray_speed + 0.1
+    assert points[-1, 3] < -0.1
+    assert np.abs(points[:, 3]).max() < 1.0
+
+
 def test_off_the_route_the_ego_brakes_straight_ahead() -> None:
     for lost in (believed(50.0, 30.0, 0.3, 10.0), believed(50.0, 0.0, 2.5, 10.0)):
         trajectory = planner().step(lost, NOBODY, {})

@@ -1,0 +1,110 @@
+"""What bounds the speed whoever has the right of way: limits, curves, narrow gaps, and places to stop at."""
+
+import math
+
+import numpy as np
+
+from dvca_sumo.messages import ObjectClass, VehicleShape
+from dvca_sumo.roadmap.route import Control
+from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.junctions import LineView
+from dvca_sumo.stack.planning.path import Path
+from dvca_sumo.stack.planning.reference import BEHIND, Window
+from dvca_sumo.stack.planning.scene import Scene
+from dvca_sumo.stack.planning.speed import Leader, Stop, slowed_before
+from dvca_sumo.stack.planning.st_graph import Graph
+
+_PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
+_PRIORITY = Control.PRIORITY
+_SLOW_FOR_PERSON = (3.0, 6.0)  # [m/s], [m/s per m of gap]
+_SLOW_FOR_OBJECT = (4.0, 10.0)  # [m/s], [m/s per m of gap]
+_SLOW_MOVER = 3.0  # [m/s] faster ones are not passed slowly
+_GIVE_AT_DESTINATION = 1.0  # [m]
+_GIVE_AT_OBJECT = 1.0  # [m] of the distance to it is never spent
+_TIMID = 1.0  # [m/s] a leader slower than this, now and in `_SOON_STEP`, may stop on the junction's exit
+_SOON_STEP = 15  # of the profile: 3 s
+
+
+def speed_caps(
+    window: Window,
+    path: Path,
+    scene: Scene,
+    graph: Graph,
+    views: list[LineView],
+    shape: VehicleShape,
+    config: PlanningConfig,
+) -> list[float]:
+    """Highest speed by metre of path [m/s]: limit, curves, passing close by, lines where others may come first.
+
+    Each is braked for in comfort beforehand.
+    """
+    caps = np.minimum(
+        config.cruise_fraction * window.speed_limits[BEHIND:],
+        np.sqrt(config.lateral_acceleration / np.maximum(np.abs(path.curvatures), 1e-4)),
+    )
+    for row, cap in _passing_speeds(scene, graph, config):
+        low, high = graph.low[row, 0] - shape.front, graph.high[row, 0] + shape.rear_overhang
+        if high > 0.0:
+            part = slice(max(int(low), 0), int(high) + 1)
+            caps[part] = np.minimum(caps[part], cap)
+    for line, distance, _, gives_way in views:
+        if gives_way and line.yields_to and distance > 0.0 and line.control is not _PRIORITY:
+            part = slice(int(distance), int(distance) + 2)
+            caps[part] = np.minimum(caps[part], config.give_way_speed)
+    slowed: list[float] = slowed_before(caps, path.arcs, config.slowing).tolist()
+    return slowed
+
+
+def nearest_stop(
+    to_destination: float,
+    scene: Scene,
+    graph: Graph,
+    views: list[LineView],
+    leader: Leader | None,
+    shape: VehicleShape,
+    config: PlanningConfig,
+) -> Stop:
+    """The first place where the ego has to stop whatever others do: destination, line, object, occupied exit.
+
+    `to_destination` counts from the front bumper [m].
+    """
+    stops = [Stop(to_destination, _GIVE_AT_DESTINATION, "stop destination")]
+    stops += [_at_line(view.distance, view.stop, config) for view in views if view.stop]
+    occupied_from = math.inf
+    obstacle = _obstacle(scene, graph, shape.front)
+    if obstacle is not None:
+        occupied_from = float(graph.low[obstacle, 0]) - shape.front
+        label = f"stop behind {scene.ids[scene.owners[obstacle]]}"
+        stops.append(Stop(occupied_from - config.object_gap, config.object_gap - _GIVE_AT_OBJECT, label))
+    if leader is not None and max(leader.speeds[0], leader.speeds[_SOON_STEP]) < _TIMID:
+        occupied_from = min(occupied_from, leader.rears[0])
+    for line, distance, _, _ in views:
+        room = occupied_from - (distance + line.exit_station - line.station)
+        if line.crosses and distance > 0.0 and 0.0 < room < shape.length + config.follow_gap:
+            stops.append(_at_line(distance, "stop exit occupied", config))
+    return min(stops, key=lambda stop: stop.at)
+
+
+def _at_line(distance: float, label: str, config: PlanningConfig) -> Stop:
+    return Stop(distance - config.stop_line_gap, config.stop_line_gap, label)
+
+
+def _obstacle(scene: Scene, graph: Graph, front: float) -> int | None:
+    """The nearest future that stands in the way, as a row; not one that the front bumper has cleared already."""
+    rows = np.arange(scene.moving, len(scene.owners))
+    standing = graph.occupied[rows, 0] & ((graph.low[rows, 0] > front) | (graph.gaps[rows, 0] < 0.0))
+    rows = rows[standing]
+    return int(rows[graph.low[rows, 0].argmin()]) if len(rows) else None
+
+
+def _passing_speeds(scene: Scene, graph: Graph, config: PlanningConfig) -> list[tuple[int, float]]:
+    """Futures that are passed close by now, as rows, and at which speed [m/s]."""
+    owners, gaps = scene.owners, graph.gaps[:, 0]
+    is_person = scene.classes[owners] == _PERSON
+    close = (gaps >= 0.0) & (gaps < np.where(is_person, config.person_slow_gap, config.object_slow_gap))
+    close &= scene.is_standing[owners] | ((scene.speeds[owners] < _SLOW_MOVER) & (scene.classes[owners] != _VEHICLE))
+    speeds = []
+    for row in np.flatnonzero(close).tolist():
+        slowest, more = _SLOW_FOR_PERSON if is_person[row] else _SLOW_FOR_OBJECT
+        speeds.append((row, slowest + more * float(gaps[row])))
+    return speeds
