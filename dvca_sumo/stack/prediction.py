@@ -19,7 +19,7 @@ from dvca_sumo.stack.lane_motion import LaneMotion, MotionModelConfig
 from dvca_sumo.stack.lane_paths import LanePaths
 
 # Comparing an array with an enumeration's member costs numpy ten times as much as with a number.
-_VEHICLE, _BICYCLE, _STATIC = int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE), int(ObjectClass.STATIC)
+_VEHICLE, _BICYCLE, _PERSON = int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 
 
 class PredictionConfig(msgspec.Struct, frozen=True):
@@ -139,9 +139,8 @@ class MapPrediction:
         return _told_apart(candidates, poses, lanes)
 
     def _straight_on(self, tracked: TrackedObjects, rows: Integers, speeds: Floats) -> Floats:
-        """Constant velocity (n, t, 3), which is none for what is static or a standing vehicle."""
-        slow = speeds < self._config.standing_speed
-        stands = (_is_wheeled(tracked) & slow) | (tracked.classes == _STATIC)
+        """Constant velocity (n, t, 3), which is none for a standing vehicle or obstacle."""
+        stands = (speeds < self._config.standing_speed) & (tracked.classes != _PERSON)
         velocities = np.where(stands[:, None], 0.0, tracked.velocities)[rows]
         poses = np.repeat(tracked.boxes[rows, None, :3], len(PREDICTION_TIMES), axis=1)
         poses[:, :, :2] += PREDICTION_TIMES[:, None] * velocities[:, None, :]

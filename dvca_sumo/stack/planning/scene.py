@@ -12,7 +12,8 @@ from dvca_sumo.stack.planning.reference import BEHIND, Window
 
 Flags = npt.NDArray[np.bool_]
 
-_PERSON, _STATIC = int(ObjectClass.PEDESTRIAN), int(ObjectClass.STATIC)
+_PERSON = int(ObjectClass.PEDESTRIAN)
+_SOON = int(np.searchsorted(PREDICTION_TIMES, 3.0))  # far enough to tell going from staying
 _SPARSE = 4  # every so many times of a hypothesis do to bound it
 _AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
 
@@ -33,7 +34,7 @@ class Scene(msgspec.Struct, frozen=True, eq=False):
     ids: list[int]  # (n,)
     classes: Integers  # (n,)
     speeds: Floats  # (n,) [m/s]
-    is_standing: Flags  # (n,) static, or too slow to tell from it
+    is_standing: Flags  # (n,) not predicted to go anywhere
     now: Extents  # (n,)
     times: Floats  # (t,) [s] from the present
     owners: Integers  # (h,) row of the object
@@ -48,16 +49,17 @@ def scene_in(
 ) -> Scene:
     """All objects with their futures at `time` [s] and after.
 
-    `stood`: the tracks that stood in the last cycle. A standing object gets the one future of staying:
-    its heading is no intention, and its noise no motion.
+    `stood`: the tracks that stood in the last cycle. An object stands that is predicted to stay, or of
+    which nothing is predicted. It gets the one future of staying: its heading is no intention, and its
+    noise no motion.
     """
     objects = predicted.objects
     speeds = np.hypot(objects.velocities[:, 0], objects.velocities[:, 1])
     ids: list[int] = objects.ids.tolist()
     slowest = [config.moving_speed if track in stood else config.standing_speed for track in ids]
-    standing = (objects.classes == _STATIC) | (speeds < slowest)
-    standing &= (objects.classes != _PERSON) | (speeds < config.standing_speed)
     counts = predicted.probabilities >= config.possible
+    foreseen = _foreseen_speeds(predicted, counts)
+    standing = foreseen < np.where(objects.classes == _PERSON, config.standing_speed, slowest)
     counts &= ~standing[predicted.owners]
     rows = np.flatnonzero(counts)
     stays = np.ones(len(standing), dtype=np.bool_)
@@ -79,6 +81,15 @@ def scene_in(
         futures=_with_still(moving, now, still),
         moving=len(rows),
     )
+
+
+def _foreseen_speeds(predicted: PredictedObjects, counts: Flags) -> Floats:
+    """Mean speed (n,) [m/s] over the next seconds in the fastest hypothesis that counts; 0 without any."""
+    rows = np.flatnonzero(counts)
+    moved = predicted.poses[rows, _SOON, :2] - predicted.poses[rows, 0, :2]
+    speeds = np.zeros(len(predicted.objects.ids))
+    np.maximum.at(speeds, predicted.owners[rows], np.hypot(moved[:, 0], moved[:, 1]) / PREDICTION_TIMES[_SOON])
+    return speeds
 
 
 def _is_around(window: Window, poses: Floats) -> Flags:
