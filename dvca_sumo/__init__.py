@@ -1,7 +1,21 @@
 """Driving violation cause analysis on SUMO: which component did it, and which message to open first."""
 
+import importlib
 import os
+from typing import TYPE_CHECKING
 
 # One thread in numpy's linear algebra: the arrays are small, sums keep one order, and a process
 # with threads cannot be forked.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+if TYPE_CHECKING:
+    from dvca_sumo.api import attribute, load_scenario, run
+
+__all__ = ["attribute", "load_scenario", "run"]
+
+
+def __getattr__(name: str) -> object:
+    """The three calls, loaded when first used: a part of the package must not cost the whole of it."""
+    if name in __all__:
+        return getattr(importlib.import_module("dvca_sumo.api"), name)
+    raise AttributeError(f"module 'dvca_sumo' has no attribute {name!r}")

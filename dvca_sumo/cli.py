@@ -10,25 +10,20 @@ from typing import NoReturn
 
 import click
 
-from dvca_sumo.analysis.attribution import (
-    Attribution,
-    AttributionStoppedError,
-    Progress,
-    Request,
-    attribute,
-)
+from dvca_sumo import api
+from dvca_sumo.analysis.attribution import Attribution, AttributionStoppedError, Progress
 from dvca_sumo.analysis.components import Verdict
 from dvca_sumo.analysis.dtest import Probe
+from dvca_sumo.api import CPUS, FactualDrive, load_scenario
 from dvca_sumo.engine.protocol import RunFailedError
 from dvca_sumo.engine.replay import ReplayEngine
-from dvca_sumo.installation import scenario_path
-from dvca_sumo.interventions import COMMON, Fault, FaultError, fault_library, planted_fault
+from dvca_sumo.interventions import COMMON, FaultError, fault_library
 from dvca_sumo.interventions.library import Parameter
 from dvca_sumo.record import Record
 from dvca_sumo.report.result import Json, Timing, result_of
 from dvca_sumo.report.terminal import verdict_text
 from dvca_sumo.roadmap import RoadMapError
-from dvca_sumo.scenario import Scenario, ScenarioError, load_scenario
+from dvca_sumo.scenario import ScenarioError
 from dvca_sumo.stack.reference import StackError
 
 _REPEATS = 3
@@ -49,15 +44,16 @@ class ExitCode(IntEnum):
 class _Terminal(Progress):
     """Progress on standard error."""
 
-    def __init__(self) -> None:
-        self.begin = time.perf_counter()
-        self.factual_wall = 0.0
+    def __init__(self, jobs: int) -> None:
+        self._jobs = jobs
+        self._begin = time.perf_counter()
+        self._factual_wall = 0.0
         self._probes = 0
 
     def factual(self, record: Record) -> None:
-        self.factual_wall = time.perf_counter() - self.begin
+        self._factual_wall = time.perf_counter() - self._begin
         said = f"{len(record.violations)} violation(s)" if record.violations else "no violation"
-        _tell(f"factual run: {said}, {self.factual_wall:.1f} s")
+        _tell(f"factual run: {said}, {self._factual_wall:.1f} s")
 
     def probe(self, probe: Probe) -> None:
         self._probes += 1
@@ -65,9 +61,10 @@ class _Terminal(Progress):
         since = f" from #{probe.question.since.index}" if probe.question.since is not None else ""
         _tell(f"probe {self._probes}: ideal {ideal}{since}: {probe.outcome.value}, {probe.wall:.1f} s")
 
-    def timing(self, engine: ReplayEngine) -> Timing:
-        attribution = time.perf_counter() - self.begin - self.factual_wall
-        return Timing(self.factual_wall, attribution, engine.name, engine.jobs)
+    def timing(self) -> Timing:
+        """What it cost up to now."""
+        attribution = time.perf_counter() - self._begin - self._factual_wall
+        return Timing(self._factual_wall, attribution, ReplayEngine.name, self._jobs)
 
 
 @click.group()
@@ -83,7 +80,7 @@ def program() -> None:
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="For SUMO's drivers and the ADS's sensors.")
 @click.option("--stack", metavar="MODULE:FACTORY|FILE.toml", help="Your own stack, or parameters of the reference one.")
 @click.option("--engine", type=click.Choice(["replay"]), default="replay", show_default=True)
-@click.option("--jobs", type=click.IntRange(1), default=os.cpu_count() or 1, show_default=True, help="Runs at once.")
+@click.option("--jobs", type=click.IntRange(1), default=CPUS, show_default=True, help="Runs at once.")
 @click.option("--jitter", is_flag=True, help="Draw schedule and sensor noise anew for each run; majority of repeats.")
 @click.option("--repeats", type=click.IntRange(1), help=f"Runs of each question in jitter mode [default: {_REPEATS}]")
 @click.option("--begin", type=float, metavar="T", help="Start of the simulation [s].")
@@ -116,17 +113,16 @@ def run(
     """
     if repeats is not None and not jitter:
         raise click.UsageError("--repeats goes with --jitter: in exact mode every run is the same")
-    scenario = load_scenario(scenario_path(sumocfg), ego, seed, begin, end)
-    planted = tuple(planted_fault(text) for text in faults)
-    request = Request(scenario, planted, (repeats or _REPEATS) if jitter else None)
-    chosen = ReplayEngine(scenario.configuration.net, stack, jobs)
-    terminal = _Terminal()
+    terminal = _Terminal(jobs)
+    scenario = load_scenario(sumocfg, ego, seed, begin, end)
+    drive = api.run(scenario, faults, stack, (repeats or _REPEATS) if jitter else None, jobs)
+    terminal.factual(drive.record)
     try:
-        found = attribute(chosen, request, terminal)
+        found = api.attribute(drive, terminal)
     except AttributionStoppedError as stopped:
-        _publish(scenario, planted, stopped.partial, terminal.timing(chosen), output, as_json=as_json)
+        _publish(drive, stopped.partial, terminal.timing(), output, as_json=as_json)
         raise KeyboardInterrupt from None
-    _publish(scenario, planted, found, terminal.timing(chosen), output, as_json=as_json)
+    _publish(drive, found, terminal.timing(), output, as_json=as_json)
     sys.exit(_exit_code(found))
 
 
@@ -166,16 +162,8 @@ def main() -> NoReturn:
     sys.exit(ExitCode.NO_VIOLATION)
 
 
-def _publish(
-    scenario: Scenario,
-    faults: tuple[Fault, ...],
-    found: Attribution,
-    timing: Timing,
-    output: Path | None,
-    *,
-    as_json: bool,
-) -> None:
-    result = result_of(scenario, faults, found, timing)
+def _publish(drive: FactualDrive, found: Attribution, timing: Timing, output: Path | None, *, as_json: bool) -> None:
+    result = result_of(drive.request.scenario, drive.request.faults, found, timing)
     if output is not None:
         output.mkdir(parents=True, exist_ok=True)
         _write(output / "result.json", result)

@@ -13,12 +13,13 @@ from dvca_sumo.analysis.dtest import Dtest, Probe, Question, Setting
 from dvca_sumo.analysis.messages import MessageAnswer, violation_inducing_message
 from dvca_sumo.analysis.specification import first_violating_plan
 from dvca_sumo.analysis.violating import principal
-from dvca_sumo.engine.protocol import Engine
+from dvca_sumo.engine.protocol import Engine, RunFailedError
 from dvca_sumo.interventions import Fault, recorded_futures
 from dvca_sumo.messages import PREDICTION_TIMES, Component, MessageId
 from dvca_sumo.record import MessageMark, Record, digest_of
 from dvca_sumo.run import StopRule, Task
-from dvca_sumo.scenario import Scenario
+from dvca_sumo.scenario import Scenario, ScenarioError
+from dvca_sumo.stack.reference import StackError
 from dvca_sumo.violations import Answer, Category, Violation
 
 SETTLE = 8.0  # [s] past the factual violation without any: a counterfactual run is safe
@@ -80,31 +81,43 @@ class Progress:
         """A probe is done."""
 
 
-def attribute(engine: Engine, request: Request, progress: Progress) -> Attribution:
-    """Run a scenario, and explain its violation if there is one.
+def factual_run(engine: Engine, request: Request) -> Record:
+    """The run that is to be explained, continued past a contact so that the last futures are whole.
 
     Raises:
         ScenarioError, StackError: The scenario cannot be run with this stack.
-        RunFailedError: The factual run crashed or hung.
-        AttributionStoppedError: The user interrupted it after the factual run.
+        RunFailedError: The process crashed or hung.
     """
-    jitters: tuple[int | None, ...] = (None,) if request.repeats is None else tuple(range(request.repeats))
-    factual = Task(request.scenario, request.faults, StopRule(after_contact=_HORIZON), jitter=jitters[0])
-    record = engine.record(factual)
-    progress.factual(record)
-    found = Attribution(record, digest_of(record), None, Verdict.NONE, True, _doubts(record), math.inf)
+    return engine.record(_factual_task(request))
+
+
+def explain(engine: Engine, request: Request, record: Record, progress: Progress) -> Attribution:
+    """Explain the violation of a factual run, if there is one.
+
+    A run without a violation of which an oracle could not tell is UNRESOLVED, not clean.
+
+    Raises:
+        AttributionStoppedError: The user interrupted it.
+    """
+    doubts = _doubts(record)
+    verdict = Verdict.UNRESOLVED if doubts else Verdict.NONE
+    found = Attribution(record, digest_of(record), None, verdict, True, doubts, math.inf)
     if not record.violations:
         return found
     violation = principal(record.violations)
     is_mission = violation.category is Category.MISSION
-    until = math.inf if is_mission else violation.time + SETTLE
-    futures = recorded_futures(record.moments)
-    dtest = Dtest(
-        engine, Setting(request.scenario, request.faults, futures, until, is_mission, jitters), progress.probe
+    setting = Setting(
+        scenario=request.scenario,
+        faults=request.faults,
+        futures=recorded_futures(record.moments),
+        until=math.inf if is_mission else violation.time + SETTLE,
+        is_mission=is_mission,
+        jitters=_jitters(request),
     )
-    found = replace(found, violation=violation, until=until, verdict=Verdict.UNRESOLVED)
+    dtest = Dtest(engine, setting, progress.probe)
+    found = replace(found, violation=violation, until=setting.until, verdict=Verdict.UNRESOLVED)
     try:
-        for answer in _steps(found, engine, dtest, factual, request):
+        for answer in _steps(found, engine, dtest, request):
             found = answer
     except KeyboardInterrupt:
         partial = replace(found, probes=tuple(dtest.probes), reason="interrupted")
@@ -114,9 +127,24 @@ def attribute(engine: Engine, request: Request, progress: Progress) -> Attributi
     )
 
 
-def _steps(found: Attribution, engine: Engine, dtest: Dtest, factual: Task, request: Request) -> Iterator[Attribution]:
+def attribute(engine: Engine, request: Request, progress: Progress) -> Attribution:
+    """Run a scenario, and explain its violation if there is one; raises what `factual_run` and `explain` do."""
+    record = factual_run(engine, request)
+    progress.factual(record)
+    return explain(engine, request, record, progress)
+
+
+def _jitters(request: Request) -> tuple[int | None, ...]:
+    return (None,) if request.repeats is None else tuple(range(request.repeats))
+
+
+def _factual_task(request: Request) -> Task:
+    return Task(request.scenario, request.faults, StopRule(after_contact=_HORIZON), jitter=_jitters(request)[0])
+
+
+def _steps(found: Attribution, engine: Engine, dtest: Dtest, request: Request) -> Iterator[Attribution]:
     """The answer after each step of Algorithm 1."""
-    doubt = _premise(engine, dtest, factual, found)
+    doubt = _premise(engine, dtest, _factual_task(request), found)
     if doubt:
         yield replace(found, verdict=Verdict.NOT_REPRODUCIBLE, is_reproducible=False, reason=doubt)
         return
@@ -139,7 +167,10 @@ def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution) ->
         return f"the repeated run could not be told: {probe.reason}"
     if probe.digest == found.digest:
         return ""
-    again = engine.record(factual)
+    try:
+        again = engine.record(factual)
+    except (ScenarioError, StackError, RunFailedError) as error:
+        return f"the repeated run differs, and one more run failed: {error}"
     for first, second in zip(found.record.path, again.path, strict=False):
         if first != second:
             return f"the repeated run differs: first at {first.time:.2f} s, ego at ({second.x:.3f}, {second.y:.3f})"
@@ -162,15 +193,12 @@ def _component_message(found: Attribution, dtest: Dtest, answer: ComponentAnswer
     record, component = found.record, answer.component
     messages = violation_inducing_message(dtest, record, component, found.violation.time, is_exact=is_exact)
     mark = messages.last_safe
-    ends = [Question((component,), mark)]
-    if messages.first_violating is not None:
-        ends.append(Question((component,), messages.first_violating))
     return replace(
         found,
         messages=messages,
         message=mark,
         differences=differences(record, MessageId(component, mark.index), dtest.futures, found.violation.object),
-        evidence=tuple(probe for probe in map(dtest.evidence, ends) if probe is not None),
+        evidence=tuple(probe for probe in map(dtest.evidence, messages.proof) if probe is not None),
     )
 
 
@@ -178,7 +206,7 @@ def _planted(faults: tuple[Fault, ...], found: Attribution) -> Planted:
     """Held against the fault of the component that was named, else against the first."""
     component = found.components.component if found.components is not None else None
     fault = next((one for one in faults if one.component == component), faults[0])
-    altered = tuple(found.record.altered[fault.component])
+    altered = tuple(dict.fromkeys(found.record.altered[fault.component]))  # two faults may touch one message
     is_right = component == fault.component
     distance: float | None = None
     if is_right and found.message is not None and altered:

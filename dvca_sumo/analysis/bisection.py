@@ -37,7 +37,7 @@ def bisect(test: Callable[[int], Outcome], bracket: Bracket, points: Sequence[in
 
     Returns:
         A bracket whose ends are adjacent points, unless all points between them are UNRESOLVED. Costs at
-        most ceil(log2(number of points between)) questions plus the unresolved ones.
+        most ceil(log2(number of points between + 1)) questions plus the unresolved ones.
     """
     if points is None:
         points = range(bracket.low + 1, bracket.high)

@@ -53,12 +53,15 @@ def responsible_component(dtest: Dtest) -> ComponentAnswer:
     if all_ideal is Outcome.VIOLATES:
         reason = "the violation stays although every other component is ideal"
         return answer(Verdict.PLANNING, Component.PLANNING, reason)
+    doubtful = [one for one in SUBSTITUTABLE if singles[one] is Outcome.UNRESOLVED]
     if not enough:
         if all_ideal is Outcome.UNRESOLVED:
             return answer(Verdict.UNRESOLVED, None, "the run with all components ideal could not be told")
+        if doubtful:
+            reason = f"runs with ideal {', '.join(doubtful)} could not be told, and no other substitution prevents it"
+            return answer(Verdict.UNRESOLVED, None, reason)
         reason = "no single substitution prevents it, all together do: more than one component takes part"
         return answer(Verdict.UNRESOLVED, None, reason)
-    doubtful = [one for one in SUBSTITUTABLE if singles[one] is Outcome.UNRESOLVED]
     if doubtful and SUBSTITUTABLE.index(doubtful[0]) < SUBSTITUTABLE.index(enough[0]):
         reason = f"the run with ideal {doubtful[0]} could not be told, and it lies upstream of {enough[0]}"
         return answer(Verdict.UNRESOLVED, None, reason)

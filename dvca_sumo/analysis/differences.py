@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.angles import wrapped
-from dvca_sumo.geometry.frames import relative, transferred
+from dvca_sumo.geometry.frames import relative, rotated, transferred
 from dvca_sumo.interventions import Futures, Occasion, state_of
 from dvca_sumo.interventions.targets import believed_pose, in_way, true_pose
 from dvca_sumo.messages import (
@@ -27,6 +27,7 @@ from dvca_sumo.stack.ideal import SUBSTITUTES
 
 _MATCHED_WITHIN = 4.0  # [m] a tracked object farther from the true one is not it
 _LISTED = 3
+_NOTICEABLE = 0.05  # [m] or comparable, see `Difference.size`: less does not show in the text
 _NOUNS = {
     ObjectClass.VEHICLE: "driving",
     ObjectClass.BICYCLE: "riding",
@@ -48,7 +49,7 @@ def differences(record: Record, message: MessageId, futures: Futures, focus: str
 
     Of objects, only `focus` (an id) counts, or the one most in the ego's way where there is none.
 
-    Empty for planning, which has no substitute, and for a message that equals the ideal one.
+    Empty for planning, which has no substitute, and for a message that as good as equals the ideal one.
     """
     substitute = SUBSTITUTES.get(message.component)
     execution = record.executions[message.component][message.index]
@@ -65,7 +66,8 @@ def differences(record: Record, message: MessageId, futures: Futures, focus: str
         found = _of_predictions(said, occasion, focus)
     elif isinstance(said, ControlCommand):
         found = _of_command(said, occasion)
-    return tuple(sorted(found, key=lambda one: -one.size)[:_LISTED])
+    noticeable = [one for one in found if one.size >= _NOTICEABLE]
+    return tuple(sorted(noticeable, key=lambda one: -one.size)[:_LISTED])
 
 
 def _occasion(record: Record, message: MessageId, tick: int, futures: Futures) -> Occasion:
@@ -194,10 +196,10 @@ def _relevant(occasion: Occasion, focus: str | None) -> list[int]:
 
 
 def _believed(occasion: Occasion, row: int) -> tuple[Floats, Floats]:
-    objects = occasion.moment.objects
+    objects, source, target = occasion.moment.objects, true_pose(occasion), believed_pose(occasion)
     box = objects.boxes[row].copy()
-    box[:3] = transferred(objects.boxes[row : row + 1, :3], true_pose(occasion), believed_pose(occasion))[0]
-    return box, objects.velocities[row]
+    box[:3] = transferred(objects.boxes[row : row + 1, :3], source, target)[0]
+    return box, rotated(objects.velocities[row : row + 1], target[2] - source[2])[0]
 
 
 def _gaps(said: TrackedObjects, box: Floats) -> Floats:

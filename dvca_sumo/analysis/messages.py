@@ -18,6 +18,7 @@ class MessageAnswer(msgspec.Struct, frozen=True):
     is_adjacent: bool
     is_monotone: bool  # as far as was asked
     note: str
+    proof: tuple[Question, ...]  # what was asked at the two ends; the run as driven is no question
 
 
 def violation_inducing_message(
@@ -28,6 +29,7 @@ def violation_inducing_message(
     Whole-run substitution must have been asked and be SAFE. In exact mode the search ends on adjacent
     messages; else on adjacent states, of which the last message of the safe one is meant. Monotonicity
     is assumed inside the bracket, and checked one state to either side of where it ends.
+    A substitution from a state on begins where a run first meets it, so states met again are not asked of.
 
     Args:
         dtest: To ask.
@@ -38,9 +40,14 @@ def violation_inducing_message(
     """
     marks = _marks(record, component, time)
     states = _first_of_states(marks)
+    if not is_exact:
+        states = sorted({marks[row].state: row for row in reversed(states)}.values())
+
+    def question(index: int) -> Question:
+        return Question((component,), marks[index] if index > 0 else None)
 
     def test(index: int) -> Outcome:
-        return dtest.ask(Question((component,), marks[index]))
+        return dtest.ask(question(index))
 
     # M[c][0:] is the whole component, M[c][len:] nothing at all: both ends are proven already.
     whole = Bracket(0, len(marks))
@@ -49,7 +56,8 @@ def violation_inducing_message(
     is_monotone = _agrees(test, states, bracket)
     low = bracket.low
     if not is_exact:
-        low = max(index for index in range(len(marks)) if marks[index].state == marks[bracket.low].state)
+        state = marks[bracket.low].state
+        low = max(index for index in range(bracket.low, bracket.high) if marks[index].state == state)
     is_adjacent = bracket.high == bracket.low + 1 if is_exact else _are_neighbours(states, bracket, len(marks))
     note = "" if is_adjacent else "messages in between could not be told"
     if not is_monotone:
@@ -60,6 +68,7 @@ def violation_inducing_message(
         is_adjacent=is_adjacent,
         is_monotone=is_monotone,
         note=note,
+        proof=tuple(question(end) for end in (bracket.low, bracket.high) if end < len(marks)),
     )
 
 

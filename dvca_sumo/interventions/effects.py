@@ -73,10 +73,11 @@ def speed_objects(message: Message, parameters: Parameters, occasion: Occasion) 
     """The chosen object's velocity is off by `ahead` and `left` [m/s], as the ego is headed."""
     tracked = _tracked(message)
     rows = _rows(tracked, parameters, occasion)
-    if rows.size == 0:
+    error = _in_map(parameters, "ahead", "left", occasion)
+    if rows.size == 0 or not error.any():
         return message
     velocities = tracked.velocities.copy()
-    velocities[rows] += _in_map(parameters, "ahead", "left", occasion)
+    velocities[rows] += error
     return msgspec.structs.replace(tracked, velocities=velocities)
 
 
@@ -100,19 +101,22 @@ def drift_predictions(message: Message, parameters: Parameters, occasion: Occasi
     """The chosen object's predicted trajectories drift by `ahead` and `left` [m/s], as the ego is headed."""
     predicted = _predicted(message)
     touched = np.flatnonzero(np.isin(predicted.owners, _rows(predicted.objects, parameters, occasion)))
-    if touched.size == 0:
+    drift = _in_map(parameters, "ahead", "left", occasion)
+    if touched.size == 0 or not drift.any():
         return message
     poses = predicted.poses.copy()
-    poses[touched, :, :2] += PREDICTION_TIMES[:, None] * _in_map(parameters, "ahead", "left", occasion)
+    poses[touched, :, :2] += PREDICTION_TIMES[:, None] * drift
     return msgspec.structs.replace(predicted, poses=poses)
 
 
 def shift_path(message: Message, parameters: Parameters, occasion: Occasion) -> Message:  # noqa: ARG001
     """The whole trajectory lies `left` [m] beside the planned one."""
-    trajectory = _trajectory(message)
+    trajectory, left = _trajectory(message), _number(parameters, "left")
+    if left == 0.0:
+        return message
     points = trajectory.points.copy()
-    points[:, X] -= _number(parameters, "left") * np.sin(points[:, HEADING])
-    points[:, Y] += _number(parameters, "left") * np.cos(points[:, HEADING])
+    points[:, X] -= left * np.sin(points[:, HEADING])
+    points[:, Y] += left * np.cos(points[:, HEADING])
     return msgspec.structs.replace(trajectory, points=points)
 
 
@@ -123,9 +127,11 @@ def change_speed(message: Message, parameters: Parameters, occasion: Occasion) -
     """
     trajectory = _trajectory(message)
     points = trajectory.points.copy()
+    speeds = np.maximum(_number(parameters, "factor") * points[:, SPEED] + _number(parameters, "error"), 0.0)
+    if np.array_equal(speeds, points[:, SPEED]):
+        return message
     steps = np.hypot(np.diff(points[:, X]), np.diff(points[:, Y]))
     planned = np.concatenate([[0.0], np.cumsum(steps)])
-    speeds = np.maximum(_number(parameters, "factor") * points[:, SPEED] + _number(parameters, "error"), 0.0)
     time_steps = np.diff(points[:, T])
     driven = np.concatenate([[0.0], np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * time_steps)])
     beyond = np.maximum(driven - planned[-1], 0.0)
@@ -152,14 +158,18 @@ def publish_nothing(message: Message, parameters: Parameters, occasion: Occasion
 
 def offset_acceleration(message: Message, parameters: Parameters, occasion: Occasion) -> Message:  # noqa: ARG001
     """The longitudinal command is off by `error` [m/s^2]."""
-    command = _command(message)
-    return msgspec.structs.replace(command, acceleration=command.acceleration + _number(parameters, "error"))
+    command, error = _command(message), _number(parameters, "error")
+    if error == 0.0:
+        return message
+    return msgspec.structs.replace(command, acceleration=command.acceleration + error)
 
 
 def offset_steering(message: Message, parameters: Parameters, occasion: Occasion) -> Message:  # noqa: ARG001
     """The lateral command is off by `error` [rad] of front wheel angle, positive to the left."""
-    command = _command(message)
-    return msgspec.structs.replace(command, steering=command.steering + _number(parameters, "error"))
+    command, error = _command(message), _number(parameters, "error")
+    if error == 0.0:
+        return message
+    return msgspec.structs.replace(command, steering=command.steering + error)
 
 
 def shift_pose(message: Message, parameters: Parameters, occasion: Occasion) -> Message:  # noqa: ARG001
@@ -167,6 +177,8 @@ def shift_pose(message: Message, parameters: Parameters, occasion: Occasion) -> 
     estimate = message
     assert isinstance(estimate, LocalizationEstimate)
     left = _number(parameters, "left")
+    if left == 0.0:
+        return message
     return msgspec.structs.replace(
         estimate, x=estimate.x - left * math.sin(estimate.heading), y=estimate.y + left * math.cos(estimate.heading)
     )
@@ -200,6 +212,8 @@ def _with_boxes(
         return message
     boxes = tracked.boxes.copy()
     boxes[rows] = change(boxes[rows])
+    if np.array_equal(boxes, tracked.boxes):
+        return message
     return msgspec.structs.replace(tracked, boxes=boxes)
 
 

@@ -93,8 +93,10 @@ def planted_fault(text: str) -> Fault:
     values: dict[str, float | str] = {key: parameter.default for key, parameter in known.items()}
     for word in filter(None, rest.split(",")):
         key, separator, value = word.partition("=")
-        if not separator or key not in known:
+        if key not in known:
             raise FaultError(f"fault {name} takes no parameter {key!r}{_nearest(key, known)}")
+        if not separator:
+            raise FaultError(f"fault {name}: parameter {key} has no value (write {key}=...)")
         values[key] = _value(name, key, known[key], value)
     return Fault(
         name=name,
@@ -124,7 +126,7 @@ def _value(fault: str, key: str, parameter: Parameter, text: str) -> float | str
         return text
     if parameter.kind == "state":
         parts = text.split(":")
-        if len(parts) != 3 or not all(part.removeprefix("-").isdigit() for part in parts):
+        if len(parts) != 3 or not all(part.removeprefix("-").isdecimal() for part in parts):
             raise FaultError(f"{where} is no state: {text!r} (allowed: three whole numbers p:v:a)")
         return text
     allowed = f"allowed: {parameter.low:g} to {parameter.high:g} {parameter.unit}".rstrip()
@@ -134,7 +136,7 @@ def _value(fault: str, key: str, parameter: Parameter, text: str) -> float | str
         raise FaultError(f"{where} is no number: {text!r} ({allowed})") from None
     if not parameter.low <= number <= parameter.high:
         raise FaultError(f"{where} is out of range: {text} ({allowed})")
-    if parameter.kind == "index" and not (math.isinf(number) or number.is_integer()):
+    if parameter.kind == "index" and not number.is_integer():
         raise FaultError(f"{where} is no whole number: {text} ({allowed})")
     return number
 

@@ -43,9 +43,9 @@ def result_of(scenario: Scenario, faults: tuple[Fault, ...], found: Attribution,
             "seed": scenario.seed,
             "step_length": STEP_LENGTH,
             "begin": scenario.begin,
-            "end": scenario.end,
+            "end": _finite(scenario.end),
             "overrides": [msgspec.to_builtins(override) for override in scenario.overrides],
-            "thresholds": msgspec.to_builtins(record.thresholds),
+            "thresholds": {name: _finite(value) for name, value in msgspec.structs.asdict(record.thresholds).items()},
         },
         "faults": [_fault(fault) for fault in faults],
         "violations": [_violation(violation) for violation in record.violations],
@@ -105,8 +105,8 @@ def _violation(violation: Violation) -> Json:
         "object": violation.object,
         "position": list(violation.position),
         "lane": violation.lane,
-        "value": violation.value,
-        "threshold": violation.threshold,
+        "value": _finite(violation.value),
+        "threshold": _finite(violation.threshold),
         "contact": None if violation.contact is None else violation.contact.value,
         "detail": violation.detail,
     }
@@ -183,8 +183,9 @@ def _ranges(indices: tuple[int, ...]) -> list[int | list[int]]:
     return [first if first == last else [first, last] for first, last in found]
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _finite(value: float | None) -> float | None:
+    """JSON knows no infinity and no NaN."""
+    return value if value is not None and math.isfinite(value) else None
 
 
 def _version(package: str) -> str:

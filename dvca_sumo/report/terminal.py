@@ -33,9 +33,10 @@ def verdict_text(found: Attribution, timing: Timing) -> str:
 def _lines(found: Attribution, timing: Timing) -> Iterator[str]:
     record = found.record
     if found.violation is None:
-        yield f"No violation. The ego {record.ego} {_came_out(record)} after {_driven(record):.1f} s."
+        said = "No violation" if found.verdict is Verdict.NONE else "No violation seen, but it could not be told"
+        yield f"{said}. The ego {record.ego} {_came_out(record)} after {_driven(record):.1f} s."
         if found.reason:
-            yield f"  not judged: {found.reason}"
+            yield f"  because  {found.reason}"
         yield _cost(found, timing)
         return
     yield from _what_happened(found.violation, record)

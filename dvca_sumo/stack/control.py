@@ -17,7 +17,7 @@ from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.messages import HEADING, ControlCommand, LocalizationEstimate, T, Trajectory, VehicleShape, X, Y
 
 
-class ControlConfig(msgspec.Struct, frozen=True):
+class ControlConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Gains and limits of the tracking controller."""
 
     period: float = 0.01  # [s] from step to step

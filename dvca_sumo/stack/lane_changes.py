@@ -9,7 +9,7 @@ from dvca_sumo.stack.lane_following import Candidates, joined
 from dvca_sumo.stack.lane_paths import LanePath, LanePaths
 
 
-class LaneChangeConfig(msgspec.Struct, frozen=True):
+class LaneChangeConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """When drifting counts as changing lanes."""
 
     preview: float = 1.5  # [s] a change shows in where the lateral speed leads within this time ...

@@ -17,7 +17,7 @@ from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.lane_paths import LanePath, LanePaths, Placements
 
 
-class LaneMatchConfig(msgspec.Struct, frozen=True):
+class LaneMatchConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """When an object counts as following a lane."""
 
     search_radius: float = 4.0  # [m] around the object's centre

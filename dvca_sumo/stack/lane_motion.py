@@ -11,7 +11,7 @@ _CRAWL = 0.05  # [m/s] slower is standing still, within a prediction's horizon
 _LATE = 100.0  # [s] later than any prediction time
 
 
-class MotionModelConfig(msgspec.Struct, frozen=True):
+class MotionModelConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How traffic is taken to drive."""
 
     trend_duration: float = 2.0  # [s] acceleration or braking seen now goes on for so long

@@ -22,7 +22,7 @@ from dvca_sumo.stack.lane_paths import LanePaths
 _VEHICLE, _BICYCLE, _PERSON = int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 
 
-class PredictionConfig(msgspec.Struct, frozen=True):
+class PredictionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How futures are drawn up."""
 
     matching: LaneMatchConfig = LaneMatchConfig()

@@ -10,12 +10,44 @@ from dvca_sumo.roadmap import RoadMap
 
 NetBuilder = Callable[..., RoadMap]
 
+# A street of two lanes each way from a over the signal at b to c; minor streets cross it at b.
+STREET_NODES = """
+<node id="a" x="0" y="0"/><node id="b" x="200" y="0" type="traffic_light"/><node id="c" x="500" y="0"/>
+<node id="n" x="200" y="100"/><node id="s" x="200" y="-100"/>"""
+STREET_EDGES = "".join(
+    f'<edge id="{start}{end}" from="{start}" to="{end}" numLanes="{lanes}" speed="13.9"/>'
+    for start, end, lanes in (
+        ("a", "b", 2),
+        ("b", "a", 2),
+        ("b", "c", 2),
+        ("c", "b", 2),
+        ("n", "b", 1),
+        ("b", "n", 1),
+        ("s", "b", 1),
+        ("b", "s", 1),
+    )
+)
+
 
 def _run(tool: str, *options: str) -> None:
     binary = Path(pytest.importorskip("sumo").SUMO_HOME) / "bin" / tool
     subprocess.run(  # noqa: S603 our own command
         [str(binary), "--no-warnings", *options], check=True, capture_output=True
     )
+
+
+def _converted(folder: Path, nodes: str, edges: str, connections: str = "") -> Path:
+    for name, text in (("nodes", nodes), ("edges", edges), ("connections", connections)):
+        (folder / name).write_text(f"<{name}>{text}</{name}>")
+    parts = [f"--{name[:-1]}-files={folder / name}" for name in ("nodes", "edges", "connections")]
+    _run("netconvert", *parts, f"--output-file={folder / 'net.xml'}", "--offset.disable-normalization")
+    return folder / "net.xml"
+
+
+@pytest.fixture(scope="session")
+def street(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The net file of `STREET_EDGES`."""
+    return _converted(tmp_path_factory.mktemp("street"), STREET_NODES, STREET_EDGES)
 
 
 @pytest.fixture(scope="session")
@@ -53,12 +85,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> NetBuilder:
     def load(nodes: str, edges: str, connections: str = "", *, vehicle_class: str = "passenger") -> RoadMap:
         key = (nodes, edges, connections, vehicle_class)
         if key not in maps:
-            folder = tmp_path_factory.mktemp("plain")
-            for name, text in (("nodes", nodes), ("edges", edges), ("connections", connections)):
-                (folder / name).write_text(f"<{name}>{text}</{name}>")
-            parts = [f"--{name[:-1]}-files={folder / name}" for name in ("nodes", "edges", "connections")]
-            _run("netconvert", *parts, f"--output-file={folder / 'net.xml'}", "--offset.disable-normalization")
-            maps[key] = RoadMap.load(folder / "net.xml", vehicle_class)
+            maps[key] = RoadMap.load(_converted(tmp_path_factory.mktemp("plain"), *key[:3]), vehicle_class)
         return maps[key]
 
     return load

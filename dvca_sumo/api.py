@@ -1,0 +1,76 @@
+"""The same as the command line, from Python: load a scenario, run it, attribute it.
+
+>>> scenario = dvca_sumo.load_scenario("nets/cs1.sumocfg")
+>>> drive = dvca_sumo.run(scenario, faults=["perception.miss"])
+>>> answer = dvca_sumo.attribute(drive)
+"""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from dvca_sumo.analysis.attribution import Attribution, Progress, Request, explain, factual_run
+from dvca_sumo.engine.protocol import Engine
+from dvca_sumo.engine.replay import ReplayEngine
+from dvca_sumo.installation import scenario_path
+from dvca_sumo.interventions import planted_fault
+from dvca_sumo.record import Record
+from dvca_sumo.scenario import Scenario
+from dvca_sumo.scenario import load_scenario as _load_scenario
+
+CPUS = os.cpu_count() or 1
+
+
+class FactualDrive(msgspec.Struct, frozen=True):
+    """A scenario as it was driven, ready to be attributed."""
+
+    request: Request
+    engine: Engine
+    record: Record
+
+
+def load_scenario(
+    path: Path | str,
+    ego: str | None = None,
+    seed: int | None = None,
+    begin: float | None = None,
+    end: float | None = None,
+) -> Scenario:
+    """As `dvca_sumo.scenario.load_scenario`; built-in scenarios (`nets/cs1.sumocfg`) are found from any folder."""
+    return _load_scenario(scenario_path(Path(path)), ego, seed, begin, end)
+
+
+def run(
+    scenario: Scenario,
+    faults: Sequence[str] = (),
+    stack: str | None = None,
+    repeats: int | None = None,
+    jobs: int = CPUS,
+) -> FactualDrive:
+    """Drive a scenario once; arguments are those of the command line.
+
+    Args:
+        scenario: What to run.
+        faults: Words of `--fault`.
+        stack: Word of `--stack`; None is the reference stack.
+        repeats: None for exact mode; else jitter mode with so many runs of each question.
+        jobs: Runs at once during attribution.
+
+    Raises:
+        ScenarioError, FaultError, StackError, RoadMapError: Bad input, in one line.
+        RunFailedError: The run's process crashed or hung.
+    """
+    request = Request(scenario, tuple(planted_fault(text) for text in faults), repeats)
+    engine = ReplayEngine(scenario.configuration.net, stack, jobs)
+    return FactualDrive(request, engine, factual_run(engine, request))
+
+
+def attribute(drive: FactualDrive, progress: Progress | None = None) -> Attribution:
+    """Explain the violation of a drive, if there is one.
+
+    Raises:
+        AttributionStoppedError: The user interrupted it; what was found is in its `partial`.
+    """
+    return explain(drive.engine, drive.request, drive.record, progress or Progress())
