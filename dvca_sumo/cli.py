@@ -141,9 +141,12 @@ def faults() -> None:
 def main() -> NoReturn:
     """The program: every error is one line and an exit code of the contract."""
     try:
-        program.main(standalone_mode=False)
-    except click.ClickException as error:
+        program.main(prog_name="dvca-sumo", standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as error:
         error.show()
+        _leave(ExitCode.USAGE)
+    except click.ClickException as error:
+        _tell(f"error: {error.format_message()}")
         _leave(ExitCode.USAGE)
     except (ScenarioError, FaultError, StackError, RoadMapError) as error:
         _tell(f"error: {error}")

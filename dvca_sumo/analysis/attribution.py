@@ -103,7 +103,7 @@ def explain(engine: Engine, request: Request, record: Record, progress: Progress
     verdict = Verdict.UNRESOLVED if doubts else Verdict.NONE
     found = Attribution(record, digest_of(record), None, verdict, True, doubts, math.inf)
     if not record.violations:
-        return found
+        return replace(found, planted=_planted(request.faults, found))
     violation = principal(record.violations)
     is_mission = violation.category is Category.MISSION
     setting = Setting(
@@ -122,9 +122,7 @@ def explain(engine: Engine, request: Request, record: Record, progress: Progress
     except KeyboardInterrupt:
         partial = replace(found, probes=tuple(dtest.probes), reason="interrupted")
         raise AttributionStoppedError(partial) from None
-    return replace(
-        found, probes=tuple(dtest.probes), planted=_planted(request.faults, found) if request.faults else None
-    )
+    return replace(found, probes=tuple(dtest.probes), planted=_planted(request.faults, found))
 
 
 def attribute(engine: Engine, request: Request, progress: Progress) -> Attribution:
@@ -202,8 +200,10 @@ def _component_message(found: Attribution, dtest: Dtest, answer: ComponentAnswer
     )
 
 
-def _planted(faults: tuple[Fault, ...], found: Attribution) -> Planted:
-    """Held against the fault of the component that was named, else against the first."""
+def _planted(faults: tuple[Fault, ...], found: Attribution) -> Planted | None:
+    """Held against the fault of the component that was named, else against the first; None without faults."""
+    if not faults:
+        return None
     component = found.components.component if found.components is not None else None
     fault = next((one for one in faults if one.component == component), faults[0])
     altered = tuple(dict.fromkeys(found.record.altered[fault.component]))  # two faults may touch one message

@@ -19,6 +19,8 @@ from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.violations import Answer, Violation
 
+_QUOTED_LINES = 3  # of a failed run's standard error
+
 
 class Question(msgspec.Struct, frozen=True):
     """Are the messages of `ideal` from `since` on (None: all of them), being ideal, enough for a safe run?"""
@@ -137,7 +139,7 @@ def majority(outcomes: Sequence[Outcome]) -> Outcome:
 
 def _probe(number: int, question: Question, jitter: int | None, answer: Glimpse | Failure, setting: Setting) -> Probe:
     if isinstance(answer, Failure):
-        reason = f"{answer.reason}; {answer.said}" if answer.said else answer.reason
+        reason = "; ".join([answer.reason, *answer.said.splitlines()[-_QUOTED_LINES:]])
         return Probe(number, question, jitter, Outcome.UNRESOLVED, None, reason, 0.0, 0.0, None, 0, None)
     outcome, reason = _outcome(answer, setting)
     return Probe(

@@ -29,7 +29,7 @@ else:
 Result = TypeVar("Result")
 
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
-_SAID_LINES = 5  # of standard error that a failure quotes
+_SAID_LINES = 60  # of standard error that a failure keeps: SUMO's words stand before a traceback
 
 
 class Failure(msgspec.Struct, frozen=True):

@@ -98,6 +98,9 @@ def planted_fault(text: str) -> Fault:
         if not separator:
             raise FaultError(f"fault {name}: parameter {key} has no value (write {key}=...)")
         values[key] = _value(name, key, known[key], value)
+    for low, high in (("start", "end"), ("first", "last")):
+        if float(values[high]) < float(values[low]):
+            raise FaultError(f"fault {name}: {high}={values[high]:g} lies before {low}={values[low]:g}")
     return Fault(
         name=name,
         component=entry.component,

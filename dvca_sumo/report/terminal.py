@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 
-from dvca_sumo.analysis.attribution import Attribution
+from dvca_sumo.analysis.attribution import Attribution, Planted
 from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.analysis.components import Verdict
 from dvca_sumo.analysis.dtest import Probe
@@ -37,6 +37,8 @@ def _lines(found: Attribution, timing: Timing) -> Iterator[str]:
         yield f"{said}. The ego {record.ego} {_came_out(record)} after {_driven(record):.1f} s."
         if found.reason:
             yield f"  because  {found.reason}"
+        if found.planted is not None:
+            yield f"  planted  {_altered(found.planted)}, to no violation"
         yield _cost(found, timing)
         return
     yield from _what_happened(found.violation, record)
@@ -119,9 +121,12 @@ def _planted(found: Attribution) -> Iterator[str]:
     yield ""
     hit = "found" if planted.component_success else "NOT found"
     which = "one that the fault altered" if planted.message_success else "NOT one that the fault altered"
-    count = len(planted.altered)
     tail = f"; the message is {which}" if found.message is not None else ""
-    yield f"PLANTED    {planted.component.value} ({count} messages altered): component {hit}{tail}"
+    yield f"PLANTED    {_altered(planted)}: component {hit}{tail}"
+
+
+def _altered(planted: Planted) -> str:
+    return f"{planted.component.value} fault, {len(planted.altered)} messages altered"
 
 
 def _cost(found: Attribution, timing: Timing) -> str:

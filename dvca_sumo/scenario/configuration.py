@@ -77,6 +77,8 @@ def read_configuration(path: Path) -> Configuration:
             by this tool (mesoscopic model).
     """
     path = path.resolve()
+    if path.is_dir():
+        raise ScenarioError(f"{path} is a folder, not a SUMO configuration")
     if not path.is_file():
         raise ScenarioError(f"no such SUMO configuration: {path}{_nearest(path)}")
     try:

@@ -27,9 +27,13 @@ def box_of_poi(position: tuple[float, float], heading: float, width: float, heig
 
 
 def boxes_of_polygon(shape: Sequence[tuple[float, float]], is_filled: bool, line_width: float) -> list[Box]:  # noqa: FBT001
-    """A polygon's body as boxes: a filled one is its smallest rectangle, a line one box a segment."""
-    if is_filled:
-        corners = np.array(shapely.Polygon(shape).minimum_rotated_rectangle.exterior.coords)
+    """A polygon's body as boxes: a filled one is its smallest rectangle, a line one box a segment.
+
+    A filled one without an area is a line.
+    """
+    rectangle = shapely.MultiPoint(shape).minimum_rotated_rectangle
+    if is_filled and rectangle.area > 0.0:
+        corners = np.array(rectangle.exterior.coords)
         along, across = corners[1] - corners[0], corners[2] - corners[1]
         centre = corners[:4].mean(axis=0)
         heading = math.atan2(along[1], along[0])

@@ -44,6 +44,7 @@ _NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
 _Row = tuple[float, float, float, float, float, float]  # box and speed
 _Body = tuple[str, ObjectClass, _Row, str]  # name, class, row, lane
 _ANY_BRAKING = 1e4  # [m/s^2] SUMO's own driver, overruled, would warn of braking for the arrival at every step
+_GIVES_UP = (libsumo.TraCIException, libsumo.FatalTraCIError)
 _TWO_WHEELED = ("bicycle", "moped", "motorcycle", "scooter")
 
 
@@ -82,8 +83,8 @@ class Session:
         os.chdir(folder)  # what a device writes relative to the working folder
         try:
             libsumo.start(["sumo", *scenario.arguments, "-a", ",".join(map(str, additionals))])
-        except libsumo.TraCIException as error:
-            raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {error}") from None
+        except _GIVES_UP as error:
+            raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {_in_one_line(error)}") from None
         self._bodies: dict[str, tuple[ObjectClass, float, float]] = {}
 
     @property
@@ -104,8 +105,8 @@ class Session:
         """
         try:
             libsumo.simulationStep()
-        except libsumo.TraCIException as error:
-            raise ScenarioError(f"SUMO stopped at {self.time:g} s: {error}") from None
+        except _GIVES_UP as error:
+            raise ScenarioError(f"SUMO stopped at {self.time:g} s: {_in_one_line(error)}") from None
 
     def departed(self) -> tuple[str, ...]:
         """Vehicles inserted in the last step."""
@@ -247,3 +248,7 @@ class Session:
         speed = libsumo.person.getSpeed(name) if is_mixed else values[tc.VAR_SPEED]
         x, y, _ = values[tc.VAR_POSITION3D]
         return key, kind, (x, y, heading, length, width, speed), ""
+
+
+def _in_one_line(error: Exception) -> str:
+    return " ".join(str(error).split())
