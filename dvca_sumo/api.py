@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 from dvca_sumo.analysis.attribution import Attribution, Progress, Request, explain, factual_run
+from dvca_sumo.engine.fork import IS_AVAILABLE, ForkEngine
 from dvca_sumo.engine.protocol import Engine
 from dvca_sumo.engine.replay import ReplayEngine
 from dvca_sumo.installation import scenario_path
@@ -21,6 +22,8 @@ from dvca_sumo.scenario import Scenario
 from dvca_sumo.scenario import load_scenario as _load_scenario
 
 CPUS = os.cpu_count() or 1
+ENGINES: dict[str, type[ForkEngine] | type[ReplayEngine]] = {"fork": ForkEngine, "replay": ReplayEngine}
+DEFAULT_ENGINE = "fork" if IS_AVAILABLE else "replay"
 
 
 class FactualDrive(msgspec.Struct, frozen=True):
@@ -48,6 +51,7 @@ def run(
     stack: str | None = None,
     repeats: int | None = None,
     jobs: int = CPUS,
+    engine: str | None = None,
 ) -> FactualDrive:
     """Drive a scenario once; arguments are those of the command line.
 
@@ -57,14 +61,20 @@ def run(
         stack: Word of `--stack`; None is the reference stack.
         repeats: None for exact mode; else jitter mode with so many runs of each question.
         jobs: Runs at once during attribution.
+        engine: "fork" or "replay"; None is fork where the system can, which also is kept alive until
+            `attribute` is done or the drive is forgotten.
 
     Raises:
         ScenarioError, FaultError, StackError, RoadMapError: Bad input, in one line.
         RunFailedError: The run's process crashed or hung.
     """
     request = Request(scenario, tuple(planted_fault(text) for text in faults), repeats)
-    engine = ReplayEngine(scenario.configuration.net, stack, jobs)
-    return FactualDrive(request, engine, factual_run(engine, request))
+    chosen = ENGINES[engine or DEFAULT_ENGINE](scenario.configuration.net, stack, jobs)
+    try:
+        return FactualDrive(request, chosen, factual_run(chosen, request))
+    except BaseException:
+        chosen.close()
+        raise
 
 
 def attribute(drive: FactualDrive, progress: Progress | None = None) -> Attribution:
@@ -73,4 +83,7 @@ def attribute(drive: FactualDrive, progress: Progress | None = None) -> Attribut
     Raises:
         AttributionStoppedError: The user interrupted it; what was found is in its `partial`.
     """
-    return explain(drive.engine, drive.request, drive.record, progress or Progress())
+    try:
+        return explain(drive.engine, drive.request, drive.record, progress or Progress())
+    finally:
+        drive.engine.close()

@@ -16,7 +16,6 @@ from dvca_sumo.analysis.components import Verdict
 from dvca_sumo.analysis.dtest import Probe
 from dvca_sumo.api import CPUS, FactualDrive, load_scenario
 from dvca_sumo.engine.protocol import RunFailedError
-from dvca_sumo.engine.replay import ReplayEngine
 from dvca_sumo.interventions import COMMON, FaultError, fault_library
 from dvca_sumo.interventions.library import Parameter
 from dvca_sumo.record import Record
@@ -44,7 +43,8 @@ class ExitCode(IntEnum):
 class _Terminal(Progress):
     """Progress on standard error."""
 
-    def __init__(self, jobs: int) -> None:
+    def __init__(self, engine: str, jobs: int) -> None:
+        self._engine = engine
         self._jobs = jobs
         self._begin = time.perf_counter()
         self._factual_wall = 0.0
@@ -64,7 +64,7 @@ class _Terminal(Progress):
     def timing(self) -> Timing:
         """What it cost up to now."""
         attribution = time.perf_counter() - self._begin - self._factual_wall
-        return Timing(self._factual_wall, attribution, ReplayEngine.name, self._jobs)
+        return Timing(self._factual_wall, attribution, self._engine, self._jobs)
 
 
 @click.group()
@@ -79,7 +79,7 @@ def program() -> None:
 @click.option("--ego", metavar="ID|auto", help="The ego's vehicle id, or auto to pick one.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="For SUMO's drivers and the ADS's sensors.")
 @click.option("--stack", metavar="MODULE:FACTORY|FILE.toml", help="Your own stack, or parameters of the reference one.")
-@click.option("--engine", type=click.Choice(["replay"]), default="replay", show_default=True)
+@click.option("--engine", type=click.Choice(list(api.ENGINES)), default=api.DEFAULT_ENGINE, show_default=True)
 @click.option("--jobs", type=click.IntRange(1), default=CPUS, show_default=True, help="Runs at once.")
 @click.option("--jitter", is_flag=True, help="Draw schedule and sensor noise anew for each run; majority of repeats.")
 @click.option("--repeats", type=click.IntRange(1), help=f"Runs of each question in jitter mode [default: {_REPEATS}]")
@@ -93,7 +93,7 @@ def run(
     ego: str | None,
     seed: int | None,
     stack: str | None,
-    engine: str,  # noqa: ARG001 - one engine as yet
+    engine: str,
     jobs: int,
     jitter: bool,  # noqa: FBT001
     repeats: int | None,
@@ -113,9 +113,9 @@ def run(
     """
     if repeats is not None and not jitter:
         raise click.UsageError("--repeats goes with --jitter: in exact mode every run is the same")
-    terminal = _Terminal(jobs)
+    terminal = _Terminal(engine, jobs)
     scenario = load_scenario(sumocfg, ego, seed, begin, end)
-    drive = api.run(scenario, faults, stack, (repeats or _REPEATS) if jitter else None, jobs)
+    drive = api.run(scenario, faults, stack, (repeats or _REPEATS) if jitter else None, jobs, engine)
     terminal.factual(drive.record)
     try:
         found = api.attribute(drive, terminal)

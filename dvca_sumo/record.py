@@ -48,6 +48,13 @@ class Record(msgspec.Struct):
     judgements: tuple[Judgement, ...]
     ending: Ending
     simulated: float  # [s] of SUMO time, the way to the departure included
+    substituted: float | None  # [s] time of the first message that an idealized substitute made
+    digests: list[bytes]  # (steps,) of everything up to each world step, the oracles' findings excluded
+
+    @property
+    def digest(self) -> str:
+        """Of the whole run, violations included."""
+        return Digest().step(self.digests, self.violations).hex()
 
     def mark(self, message: MessageId) -> MessageMark:
         """Time and vehicle dynamic state of a message."""
@@ -91,20 +98,20 @@ def moved_on(moment: Moment, ego: EgoTruth) -> Moment:
     )
 
 
-def digest_of(record: Record) -> str:
-    """A fingerprint of everything the run produced: messages, motion, truth, violations.
+class Digest:
+    """A fingerprint of everything a run produced, taken step by step.
 
-    Equal records have equal digests on every machine with the same floating point results.
+    Equal runs have equal digests on every machine with the same floating point results; the digest of a
+    step covers all before it, so that two runs can be compared up to any step.
     """
-    summed = hashlib.blake2b(digest_size=16)
-    for component in COMPONENTS:
-        for execution in record.executions[component]:
-            summed.update(_ENCODER.encode((execution.tick, execution.message)))
-    summed.update(np.array([msgspec.structs.astuple(ego) for ego in record.path]).tobytes())
-    for moment in record.moments:
-        summed.update(_ENCODER.encode(moment.objects))
-    summed.update(_ENCODER.encode(record.violations))
-    return summed.hexdigest()
+
+    def __init__(self) -> None:
+        self._summed = hashlib.blake2b(digest_size=16)
+
+    def step(self, *parts: object) -> bytes:
+        """Take in what a step produced (messages, truth, or collections of them); the digest so far."""
+        self._summed.update(_ENCODER.encode(parts))
+        return self._summed.copy().digest()
 
 
 def _bytes_of(value: object) -> object:

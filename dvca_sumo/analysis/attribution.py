@@ -16,7 +16,7 @@ from dvca_sumo.analysis.violating import principal
 from dvca_sumo.engine.protocol import Engine, RunFailedError
 from dvca_sumo.interventions import Fault, recorded_futures
 from dvca_sumo.messages import PREDICTION_TIMES, Component, MessageId
-from dvca_sumo.record import MessageMark, Record, digest_of
+from dvca_sumo.record import MessageMark, Record
 from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.stack.reference import StackError
@@ -101,7 +101,7 @@ def explain(engine: Engine, request: Request, record: Record, progress: Progress
     """
     doubts = _doubts(record)
     verdict = Verdict.UNRESOLVED if doubts else Verdict.NONE
-    found = Attribution(record, digest_of(record), None, verdict, True, doubts, math.inf)
+    found = Attribution(record, record.digest, None, verdict, True, doubts, math.inf)
     if not record.violations:
         return replace(found, planted=_planted(request.faults, found))
     violation = principal(record.violations)
@@ -157,22 +157,21 @@ def _steps(found: Attribution, engine: Engine, dtest: Dtest, request: Request) -
 
 def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution) -> str:
     """Why the violation does not reproduce; empty when it does."""
-    if factual.jitter is not None:
-        outcome = dtest.ask(Question(()))
-        return "" if outcome is Outcome.VIOLATES else f"most re-runs do not violate: {outcome}"
-    probe = dtest.repeat(factual)
-    if probe.outcome is Outcome.UNRESOLVED:
+    outcome = dtest.ask(Question(()))
+    if outcome is not Outcome.VIOLATES and factual.jitter is not None:
+        return f"most re-runs do not violate: {outcome}"
+    probe = dtest.probes[0]
+    if outcome is Outcome.UNRESOLVED:
         return f"the repeated run could not be told: {probe.reason}"
-    if probe.digest == found.digest:
+    digests = found.record.digests
+    if factual.jitter is not None or (probe.steps > 0 and digests[probe.steps - 1 : probe.steps] == [probe.last_step]):
         return ""
     try:
-        again = engine.record(factual)
+        again = engine.record(factual).digests
     except (ScenarioError, StackError, RunFailedError) as error:
         return f"the repeated run differs, and one more run failed: {error}"
-    for first, second in zip(found.record.path, again.path, strict=False):
-        if first != second:
-            return f"the repeated run differs: first at {first.time:.2f} s, ego at ({second.x:.3f}, {second.y:.3f})"
-    return "the repeated run differs in its messages or its traffic, not in the ego's motion"
+    same = next((step for step, pair in enumerate(zip(digests, again, strict=False)) if len({*pair}) > 1), len(again))
+    return f"the repeated run differs: first at {found.record.start + 0.1 * same:.1f} s"
 
 
 def _planning_message(found: Attribution, engine: Engine) -> Attribution:

@@ -41,6 +41,8 @@ class Probe(msgspec.Struct, frozen=True):
     simulated: float  # [s]
     wall: float  # [s]
     digest: str | None
+    last_step: bytes  # see Glimpse
+    steps: int
     passes: int
     residual: float | None  # [m] see Glimpse
 
@@ -97,14 +99,6 @@ class Dtest:
             self._answers[question] = majority([one.outcome for one in probes if one.question == question])
         return [self._answers[question] for question in questions]
 
-    def repeat(self, factual: Task) -> Probe:
-        """Run the factual task once more, to the same end: the premise of every conclusion."""
-        (answer,) = self._engine.glimpses([factual], lambda _row, _answer: None)
-        probe = _probe(len(self.probes), Question(()), factual.jitter, answer, self._setting)
-        self._on_probe(probe)
-        self.probes.append(probe)
-        return probe
-
     def evidence(self, question: Question) -> Probe | None:
         """The first probe of a question, among those that agree with its answer; None when it was not asked."""
         if question not in self._answers:
@@ -140,7 +134,7 @@ def majority(outcomes: Sequence[Outcome]) -> Outcome:
 def _probe(number: int, question: Question, jitter: int | None, answer: Glimpse | Failure, setting: Setting) -> Probe:
     if isinstance(answer, Failure):
         reason = "; ".join([answer.reason, *answer.said.splitlines()[-_QUOTED_LINES:]])
-        return Probe(number, question, jitter, Outcome.UNRESOLVED, None, reason, 0.0, 0.0, None, 0, None)
+        return Probe(number, question, jitter, Outcome.UNRESOLVED, None, reason, 0.0, 0.0, None, b"", 0, 0, None)
     outcome, reason = _outcome(answer, setting)
     return Probe(
         id=number,
@@ -152,6 +146,8 @@ def _probe(number: int, question: Question, jitter: int | None, answer: Glimpse 
         simulated=answer.simulated,
         wall=answer.wall,
         digest=answer.digest,
+        last_step=answer.last_step,
+        steps=answer.steps,
         passes=answer.passes,
         residual=answer.residual,
     )

@@ -28,7 +28,7 @@ def violation_inducing_message(
 
     Whole-run substitution must have been asked and be SAFE. In exact mode the search ends on adjacent
     messages; else on adjacent states, of which the last message of the safe one is meant. Monotonicity
-    is assumed inside the bracket, and checked one state to either side of where it ends.
+    is assumed inside the bracket, and checked one state to either side of the states where it ends.
     A substitution from a state on begins where a run first meets it, so states met again are not asked of.
 
     Args:
@@ -53,7 +53,7 @@ def violation_inducing_message(
     whole = Bracket(0, len(marks))
     between_states = bisect(test, whole, states)
     bracket = bisect(test, between_states) if is_exact else between_states
-    is_monotone = _agrees(test, states, bracket)
+    is_monotone = _agrees(test, states, between_states)
     low = bracket.low
     if not is_exact:
         state = marks[bracket.low].state

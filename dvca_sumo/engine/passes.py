@@ -5,7 +5,7 @@ repeated with the futures that its own previous pass recorded, until they agree.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import msgspec
 import numpy as np
@@ -13,8 +13,9 @@ import numpy as np
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.interventions import Futures, Ideal, recorded_futures
 from dvca_sumo.messages import Component
-from dvca_sumo.record import Record, digest_of
+from dvca_sumo.record import Record
 from dvca_sumo.run import Task
+from dvca_sumo.truth import Moment
 
 MOST_PASSES = 3
 TOLERANCE = 0.5  # [m] between a predicted and a real place
@@ -22,38 +23,66 @@ _MATTERING = 30.0  # [m] from the ego
 _COMPARED_EVERY = 5  # world steps
 
 
-def glimpse(task: Task, rtest: Callable[[Task], Record]) -> Glimpse:
-    """Run a task, as many passes as its ideal predictions need, and keep what matters of the last."""
-    begin = time.perf_counter()
-    record = rtest(task)
-    simulated, passes, residual = record.simulated, 1, None
-    if any(isinstance(one, Ideal) and one.component is Component.PREDICTION for one in task.interventions):
-        residual = divergence(task.futures, record)
-        while residual > TOLERANCE and passes < MOST_PASSES:
-            futures = Futures({**task.futures.tracks, **recorded_futures(record.moments).tracks})
-            task = msgspec.structs.replace(task, futures=futures)
-            record = rtest(task)
-            simulated, passes, residual = simulated + record.simulated, passes + 1, divergence(futures, record)
-    return Glimpse(
+class Pass(msgspec.Struct, frozen=True):
+    """One run of a task, in short."""
+
+    glimpse: Glimpse
+    futures: Futures  # what happened from the first substituted message on; empty without ideal prediction
+
+
+def predicts_ideally(task: Task) -> bool:
+    """Whether a task substitutes prediction."""
+    return any(isinstance(one, Ideal) and one.component is Component.PREDICTION for one in task.interventions)
+
+
+def summary(task: Task, record: Record, simulated: float, wall: float) -> Pass:
+    """What is kept of a run of `task` that took `simulated` [s] of simulation and `wall` [s]."""
+    residual, futures = None, Futures()
+    if predicts_ideally(task):
+        since = record.start if record.substituted is None else record.substituted
+        moments = [moment for moment in record.moments if moment.time >= since]
+        residual, futures = divergence(task.futures, moments), recorded_futures(moments)
+    glimpse = Glimpse(
         violations=tuple(record.violations),
         judgements=record.judgements,
         ending=record.ending,
-        digest=digest_of(record),
+        digest=record.digest,
+        last_step=record.digests[-1] if record.digests else b"",
+        steps=len(record.digests),
         simulated=simulated,
+        wall=wall,
+        passes=1,
+        residual=residual,
+    )
+    return Pass(glimpse, futures)
+
+
+def settled(task: Task, run: Callable[[Task], Pass]) -> Glimpse:
+    """Run a task, as many passes as its ideal predictions need; the last one, with the cost of all."""
+    begin = time.perf_counter()
+    last, simulated, passes = run(task), 0.0, 1
+    while (last.glimpse.residual or 0.0) > TOLERANCE and passes < MOST_PASSES:
+        simulated += last.glimpse.simulated
+        passes += 1
+        # Objects that the pass did not meet again keep their factual future.
+        task = msgspec.structs.replace(task, futures=Futures({**task.futures.tracks, **last.futures.tracks}))
+        last = run(task)
+    return msgspec.structs.replace(
+        last.glimpse,
+        simulated=simulated + last.glimpse.simulated,
         wall=time.perf_counter() - begin,
         passes=passes,
-        residual=residual,
     )
 
 
-def divergence(futures: Futures, record: Record) -> float:
+def divergence(futures: Futures, moments: Sequence[Moment]) -> float:
     """Largest distance [m] between where `futures` had the objects near the ego and where they were.
 
     An object that `futures` does not hold was predicted at constant velocity from where it was seen:
     it is not counted.
     """
     worst = 0.0
-    for moment in record.moments[::_COMPARED_EVERY]:
+    for moment in moments[::_COMPARED_EVERY]:
         ego, objects = moment.ego, moment.objects
         near = np.hypot(objects.boxes[:, 0] - ego.x, objects.boxes[:, 1] - ego.y) < _MATTERING
         for row in np.flatnonzero(near):

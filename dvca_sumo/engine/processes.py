@@ -56,12 +56,12 @@ class _Child(Generic[Result]):
         """Its result; called when the pipe has something to say or is closed."""
         try:
             answer: Result | Failure = self.receiver.recv()
-        except EOFError:
+        except (EOFError, OSError):  # the latter when it died in the middle of its answer
             self.process.join()
-            return Failure(_death(self.process.exitcode), _said(self.log))
+            return Failure(_death(self.process.exitcode), said_in(self.log))
         self.process.join()
         if isinstance(answer, Failure):
-            return Failure(answer.reason, _said(self.log), answer.error)
+            return Failure(answer.reason, said_in(self.log), answer.error)
         return answer
 
     def kill(self) -> None:
@@ -94,7 +94,7 @@ def isolated(
                 for child in [one for one in running if time.monotonic() > one.deadline]:
                     running.remove(child)
                     child.kill()
-                    yield child.index, Failure(f"no answer within {timeout:.0f} s", _said(child.log))
+                    yield child.index, Failure(f"no answer within {timeout:g} s", said_in(child.log))
         finally:
             for child in running:
                 child.kill()
@@ -102,7 +102,7 @@ def isolated(
 
 def _work(job: Callable[[], object], sender: Connection, log: Path, parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt ends
-    _die_with(parent)
+    die_with(parent)
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
@@ -110,13 +110,13 @@ def _work(job: Callable[[], object], sender: Connection, log: Path, parent: int)
         answer = job()
     except Exception as error:  # noqa: BLE001 - whatever a job raises is its answer
         os.write(2, traceback.format_exc().encode())
-        answer = Failure(f"{type(error).__name__}: {error}", "", _sendable(error))
+        answer = Failure(f"{type(error).__name__}: {error}", "", sendable(error))
     sender.send(answer)
     sender.close()
     os._exit(0)  # SUMO's and the test runner's exit handlers are not this process's business
 
 
-def _sendable(error: Exception) -> Exception | None:
+def sendable(error: Exception) -> Exception | None:
     """The bare error, or None where it does not survive the way to another process."""
     error.__traceback__ = error.__cause__ = error.__context__ = None
     try:
@@ -126,7 +126,8 @@ def _sendable(error: Exception) -> Exception | None:
     return error
 
 
-def _die_with(parent: int) -> None:
+def die_with(parent: int) -> None:
+    """End this process when the one that forked it ends (Linux only)."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:  # it died before the line above
@@ -139,6 +140,7 @@ def _death(code: int | None) -> str:
     return f"the process ended with code {code} without an answer"
 
 
-def _said(log: Path) -> str:
+def said_in(log: Path) -> str:
+    """The last lines of a process's standard error."""
     lines = log.read_text(errors="replace").splitlines() if log.exists() else []
     return "\n".join(lines[-_SAID_LINES:])

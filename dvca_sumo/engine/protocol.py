@@ -19,6 +19,8 @@ class Glimpse(msgspec.Struct, frozen=True):
     judgements: tuple[Judgement, ...]
     ending: Ending
     digest: str
+    last_step: bytes  # digest of the run up to its last world step, to be held against another run's
+    steps: int  # world steps driven
     simulated: float  # [s]
     wall: float  # [s]
     passes: int  # runs made until ideal predictions came true; 1 when there were none
@@ -44,6 +46,10 @@ class Engine(Protocol):
         self, tasks: Sequence[Task], on_result: Callable[[int, Glimpse | Failure], None]
     ) -> list[Glimpse | Failure]:
         """Outcomes of several runs, in the order of `tasks`; `on_result` hears of each as it finishes."""
+        ...
+
+    def close(self) -> None:
+        """Let go of everything that was kept for branching; the engine goes on to work, from time 0."""
         ...
 
 

@@ -1,10 +1,11 @@
 """The replay engine: every run starts at time 0, in a process of its own."""
 
+import time
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from pathlib import Path
 
-from dvca_sumo.engine.passes import glimpse
+from dvca_sumo.engine.passes import Pass, settled, summary
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.engine.protocol import Glimpse, RunFailedError
 from dvca_sumo.record import Record
@@ -13,7 +14,7 @@ from dvca_sumo.run import Task, rtest
 from dvca_sumo.scenario import ScenarioError
 from dvca_sumo.stack.reference import StackError, stack_factory
 
-_DEFAULT_TIMEOUT = 600.0  # [s] of wall time for one run
+DEFAULT_TIMEOUT = 600.0  # [s] of wall time for one run
 
 
 class ReplayEngine:
@@ -21,7 +22,7 @@ class ReplayEngine:
 
     name = "replay"
 
-    def __init__(self, net: Path, stack: str | None, jobs: int, timeout: float = _DEFAULT_TIMEOUT) -> None:
+    def __init__(self, net: Path, stack: str | None, jobs: int, timeout: float = DEFAULT_TIMEOUT) -> None:
         """An engine for scenarios on one net, with one stack (`--stack`'s word).
 
         Raises:
@@ -33,7 +34,7 @@ class ReplayEngine:
         self._stack = stack
         self._timeout = timeout
         # Loaded before any process starts: a forked child finds both in its cache.
-        self.roadmap = _roadmap(net, "passenger")
+        self.roadmap = roadmap(net, "passenger")
         stack_factory(stack)
 
     def record(self, task: Task) -> Record:
@@ -41,7 +42,7 @@ class ReplayEngine:
         job = partial(_rtest, self._net, self._stack, task)
         ((_, answer),) = isolated([job], 1, self._timeout)
         if isinstance(answer, Failure):
-            raise _raised(answer)
+            raise raised(answer)
         return answer
 
     def glimpses(
@@ -55,21 +56,32 @@ class ReplayEngine:
             on_result(row, answer)
         return [answers[row] for row in range(len(tasks))]
 
+    def close(self) -> None:
+        """See `Engine`; nothing is kept."""
+
 
 @cache
-def _roadmap(net: Path, vehicle_class: str) -> RoadMap:
+def roadmap(net: Path, vehicle_class: str) -> RoadMap:
+    """The map of a net, read once: a forked child finds it here."""
     return RoadMap.load(net, vehicle_class)
 
 
 def _rtest(net: Path, stack: str | None, task: Task) -> Record:
-    return rtest(task, partial(_roadmap, net), stack_factory(stack))
+    return rtest(task, partial(roadmap, net), stack_factory(stack))
 
 
 def _glimpse(net: Path, stack: str | None, task: Task) -> Glimpse:
-    return glimpse(task, partial(_rtest, net, stack))
+    return settled(task, partial(_pass, net, stack))
 
 
-def _raised(failure: Failure) -> Exception:
+def _pass(net: Path, stack: str | None, task: Task) -> Pass:
+    begin = time.perf_counter()
+    record = _rtest(net, stack, task)
+    return summary(task, record, record.simulated, time.perf_counter() - begin)
+
+
+def raised(failure: Failure) -> Exception:
+    """The exception that tells a user of a failed factual run."""
     words = _sumo_words(failure.said)
     if isinstance(failure.error, ScenarioError):
         return ScenarioError(f"{failure.error}{words}")
@@ -80,5 +92,10 @@ def _raised(failure: Failure) -> Exception:
 
 def _sumo_words(said: str) -> str:
     """SUMO's own explanation: an exception of libsumo's does not carry it."""
-    lines = [line.strip() for line in said.splitlines() if line.startswith(("Error:", "***", "Fatal"))]
-    return f" ({' '.join(lines)})" if lines else ""
+    words: list[str] = []
+    is_error = False
+    for line in said.splitlines():
+        is_error = line.startswith(("Error:", "***", "Fatal")) or (is_error and line.startswith(" "))
+        if is_error:
+            words += line.split()
+    return f" ({' '.join(words)})" if words else ""

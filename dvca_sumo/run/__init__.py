@@ -1,12 +1,11 @@
 """The closed loop of one run: the world steps, the stack drives, the oracles judge."""
 
+import contextlib
 import math
-import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
 from dvca_sumo.oracles import judges
@@ -15,11 +14,11 @@ from dvca_sumo.roadmap import RoadMap, Route, RouteError
 from dvca_sumo.run.drive import Drive, Judging
 from dvca_sumo.run.task import StopRule, Task
 from dvca_sumo.scenario import Scenario, ScenarioError, arrival_position
-from dvca_sumo.stack.reference import StackContext, StackFactory
+from dvca_sumo.stack.reference import Stack, StackContext, StackFactory
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.world import Entry, VehicleLimits, World, shape_of
 
-__all__ = ["Drive", "RoadMapOf", "StopRule", "Task", "rtest"]
+__all__ = ["Drive", "RoadMapOf", "Simulation", "StopRule", "Task", "departed", "rtest"]
 
 _SHORTEST_AUTO_TRIP = 500.0  # [m]
 # Longest allowed duration of a trip, unless the scenario ends before.
@@ -30,6 +29,56 @@ _PATIENCE_BASE = 90.0  # [s] ... plus this
 RoadMapOf = Callable[[str], RoadMap]  # the scenario's map as drivers of a vehicle class see it
 
 
+class Simulation:
+    """A drive in its world, from the ego's departure on."""
+
+    def __init__(self, world: World, drive: Drive, begin: float) -> None:
+        self.drive = drive
+        self._world = world
+        self._begin = begin
+
+    @property
+    def simulated(self) -> float:
+        """SUMO time passed since the scenario's begin [s]."""
+        return self._world.time - self._begin
+
+    def proceed(self, at_step: Callable[[], None] = lambda: None) -> Record:
+        """Drive to the end; `at_step` is called before every world step's cycle.
+
+        Raises:
+            ScenarioError: SUMO removed the ego or gave up.
+            StackError: A component failed.
+        """
+        at_step()
+        while self.drive.cycle(self._world.observe(self.drive.ego)):
+            self._world.advance()
+            at_step()
+        return self.drive.record(self.simulated)
+
+
+@contextlib.contextmanager
+def departed(task: Task, roadmap_of: RoadMapOf, factory: StackFactory) -> Iterator[Simulation]:
+    """SUMO started and stepped until the ego has departed; ended with the context.
+
+    Raises:
+        ScenarioError: The scenario cannot be run (SUMO refuses it, the ego never departs).
+        StackError: The stack cannot be built.
+    """
+    origin = Path.cwd()
+
+    def built(context: StackContext) -> Stack:
+        with contextlib.chdir(origin):  # a user's factory finds its files where the command was typed
+            return factory(context)
+
+    # SUMO's devices write into the working folder what a vehicle's own parameters ask for.
+    with tempfile.TemporaryDirectory(prefix="dvca-sumo-") as folder, contextlib.chdir(folder):
+        world = World(task.scenario, Path(folder))
+        try:
+            yield Simulation(world, _departure(task, world, roadmap_of, built), task.scenario.begin)
+        finally:
+            world.close()
+
+
 def rtest(task: Task, roadmap_of: RoadMapOf, factory: StackFactory) -> Record:
     """Run a scenario once, in this process.
 
@@ -37,17 +86,8 @@ def rtest(task: Task, roadmap_of: RoadMapOf, factory: StackFactory) -> Record:
         ScenarioError: The scenario cannot be run (SUMO refuses it, the ego never departs or is removed).
         StackError: The stack cannot be built, or one of its components failed.
     """
-    origin = Path.cwd()
-    with tempfile.TemporaryDirectory(prefix="dvca-sumo-") as folder:
-        world = World(task.scenario, Path(folder))
-        try:
-            drive = _departure(task, world, roadmap_of, factory)
-            while drive.cycle(world.observe(drive.ego)):
-                world.advance()
-            return drive.record(world.time - task.scenario.begin)
-        finally:
-            world.close()
-            os.chdir(origin)
+    with departed(task, roadmap_of, factory) as simulation:
+        return simulation.proceed()
 
 
 def _departure(task: Task, world: World, roadmap_of: RoadMapOf, factory: StackFactory) -> Drive:
@@ -74,7 +114,7 @@ def _departure(task: Task, world: World, roadmap_of: RoadMapOf, factory: StackFa
 
 def _route(entry: Entry, scenario: Scenario, roadmap: RoadMap) -> Route:
     arrival = arrival_position(scenario.configuration, entry.ego)
-    length = roadmap.lanes[f"{entry.edges[-1]}_0"].line.length
+    length = roadmap.lanes[f"{entry.edges[-1]}_0"].length
     if arrival is None:
         arrival = length
     elif arrival < 0.0:
@@ -89,7 +129,11 @@ def _patience(route: Route) -> float:
 
 
 def _thresholds(entry: Entry) -> Thresholds:
-    try:
-        return msgspec.convert(entry.parameters, Thresholds, strict=False)
-    except msgspec.ValidationError as error:
-        raise ScenarioError(f"a dvca. parameter of the ego {entry.ego!r} is wrong: {error}") from None
+    for name, text in entry.parameters.items():
+        try:
+            is_allowed = float(text) >= 0.0  # NaN is not
+        except ValueError:
+            is_allowed = False
+        if not is_allowed:
+            raise ScenarioError(f"parameter dvca.{name} of the ego {entry.ego!r} is {text!r} (allowed: 0 or more)")
+    return Thresholds(**{name: float(text) for name, text in entry.parameters.items()})

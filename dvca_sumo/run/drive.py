@@ -1,7 +1,7 @@
 """One ego's closed loop: sense, five components, move, be judged."""
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from dvca_sumo.geometry.randomness import uniforms
 from dvca_sumo.interventions import Fault, Gate, Intervention, Occasion, state_of
@@ -19,7 +19,7 @@ from dvca_sumo.messages import (
 )
 from dvca_sumo.oracles import Oracle
 from dvca_sumo.oracles.no_progress import NoProgress
-from dvca_sumo.record import TICK, Execution, Record, moved_on
+from dvca_sumo.record import TICK, Digest, Execution, Record, moved_on
 from dvca_sumo.run.task import Task
 from dvca_sumo.stack.ideal import SUBSTITUTES
 from dvca_sumo.stack.reference import Stack, StackError
@@ -32,6 +32,8 @@ TICKS_PER_STEP = 10
 _ARRIVED_WITHIN = 3.0  # [m]
 _LOST_BEYOND = 60.0  # [m] past its destination an ego will not come back
 _PHASE_STREAM = 101
+
+Answer = TypeVar("Answer")
 
 
 class Channels:
@@ -87,6 +89,25 @@ class Drive:
         self._stations: list[float] = []
         self._moments: list[Moment] = []
         self._violations: list[Violation] = []
+        self._substituted: float | None = None  # [s] time of the first substituted message
+        self._digest = Digest()
+        self._digests: list[bytes] = []
+
+    @property
+    def steps(self) -> int:
+        """World steps driven so far."""
+        return self._tick // TICKS_PER_STEP
+
+    def branch(self, task: Task) -> None:
+        """Go on under another task; interventions that both have keep what they remember."""
+        for component in COMPONENTS:
+            old = self._interventions[component]
+            self._interventions[component] = [
+                (one, next((gate for known, gate in old if known == one), Gate(one.selection)))
+                for one in task.interventions
+                if one.component == component
+            ]
+        self._task = task
 
     def cycle(self, moment: Moment) -> bool:
         """Judge this step's truth, then drive to the next step; False when the drive is over.
@@ -100,6 +121,7 @@ class Drive:
         if self._ending is not None:
             return False
         station = self.ego.station()
+        counts = [len(made) for made in self._executions.values()]
         for phase in range(TICKS_PER_STEP):
             truth = self.ego.vehicle.truth
             self._path.append(truth)
@@ -112,9 +134,11 @@ class Drive:
             try:
                 self.ego.vehicle.advance(command, TICK)
             except ControlCommandError as error:
-                raise StackError(str(error)) from None
+                raise StackError(f"{error}, in cycle {self._tick // TICKS_PER_STEP}") from None
             station += truth.speed * TICK
             self._tick += 1
+        fresh = [made[count:] for made, count in zip(self._executions.values(), counts, strict=True)]
+        self._digests.append(self._digest.step(fresh, self._path[-TICKS_PER_STEP:], moment.objects))
         return True
 
     def record(self, simulated: float) -> Record:
@@ -139,6 +163,8 @@ class Drive:
             judgements=judgements,
             ending=ending,
             simulated=simulated,
+            substituted=self._substituted,
+            digests=self._digests,
         )
 
     def _execute(self, component: Component, moment: Moment) -> None:
@@ -182,40 +208,48 @@ class Drive:
 
     def _replaced(self, intervention: Intervention, message: Message | None, occasion: Occasion) -> Message | None:
         if not isinstance(intervention, Fault):
+            if self._substituted is None:
+                self._substituted = occasion.moment.time
             return SUBSTITUTES[intervention.component](occasion)
         if message is None:
             return None
         altered = EFFECTS[intervention.effect](message, intervention.parameters, occasion)
-        if altered is not message:
-            self._altered[intervention.component].append(occasion.message.index)
+        indices = self._altered[intervention.component]
+        if altered is not message and indices[-1:] != [occasion.message.index]:  # two faults may touch one message
+            indices.append(occasion.message.index)
         return altered
 
     def _localize(self, moment: Moment) -> Message:  # noqa: ARG002 - all steps are called alike
         truth, sensors = self._path[-1], self._stack.sensors
         cycle, phase = divmod(self._tick, TICKS_PER_STEP)
         fix = sensors.fix(truth, cycle) if phase == 0 else None
-        return self._stack.localization.step(sensors.odometry(truth, self._tick), fix)
+        return _checked(self._stack.localization.step(sensors.odometry(truth, self._tick), fix), LocalizationEstimate)
 
     def _perceive(self, moment: Moment) -> Message | None:
         believed = self._channels.localization
         if believed is None:
             return None
         detections = self._stack.sensors.detections(moved_on(moment, self._path[-1]), self._tick // TICKS_PER_STEP)
-        return self._stack.perception.step(detections, believed)
+        return _checked(self._stack.perception.step(detections, believed), TrackedObjects)
 
     def _predict(self, moment: Moment) -> Message | None:  # noqa: ARG002
         tracked = self._channels.perception
-        return None if tracked is None else self._stack.prediction.step(tracked)
+        if tracked is None:
+            return None
+        return _checked(self._stack.prediction.step(tracked), PredictedObjects)
 
     def _plan(self, moment: Moment) -> Message | None:  # noqa: ARG002
         channels = self._channels
         if channels.localization is None or channels.prediction is None or channels.perception is None:
             return None
-        return self._stack.planning.step(channels.localization, channels.prediction, channels.perception.signals)
+        signals = channels.perception.signals
+        return _checked(self._stack.planning.step(channels.localization, channels.prediction, signals), Trajectory)
 
     def _control(self, moment: Moment) -> Message | None:  # noqa: ARG002
         believed = self._channels.localization
-        return None if believed is None else self._stack.control.step(believed, self._channels.planning)
+        if believed is None:
+            return None
+        return _checked(self._stack.control.step(believed, self._channels.planning), ControlCommand)
 
     def _judge(self, moment: Moment) -> None:
         if moment.time > self._contact:
@@ -237,6 +271,13 @@ class Drive:
             return Ending.TIME_OVER
         stop = min(rule.at, self._breach + rule.after_violation, self._contact + rule.after_contact)
         return Ending.CUT if moment.time >= stop - TICK else None
+
+
+def _checked(answer: object, kind: type[Answer]) -> Answer:
+    """A component's answer: a user's own stack may give anything."""
+    if not isinstance(answer, kind):
+        raise TypeError(f"its step returned {type(answer).__name__}, not {kind.__name__}")
+    return answer
 
 
 def _phases(task: Task) -> dict[Component, int | None]:

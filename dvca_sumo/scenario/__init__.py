@@ -23,6 +23,8 @@ __all__ = [
 
 STEP_LENGTH = 0.1  # [s] of every run, whatever the sumocfg says
 
+# Outputs of one file a step: the name becomes part of theirs, so they go to the run's scratch folder.
+_NUMBERED = {"vtk-output": "vtk"}
 _SUMO_SEED = 23423  # SUMO's own default, so that a plain `sumo -c` shows the same traffic
 
 
@@ -47,7 +49,7 @@ class Scenario(msgspec.Struct, frozen=True):
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """SUMO's command line, but for the additional files (see `silenced`)."""
+        """SUMO's command line, but for net and additional files (see `silenced`)."""
         words = ["-c", str(self.configuration.path)]
         for override in self.overrides:
             words += [f"--{override.option}", override.used]
@@ -92,7 +94,6 @@ def _overrides(configuration: Configuration, seed: int, begin: float) -> tuple[O
     wanted = [
         ("seed", str(seed), "explicit seed"),
         ("random", "false", "equal runs must repeat"),
-        ("begin", f"{begin:g}", "asked for"),
         ("end", "-1", "the run ends with the ego's trip"),
         ("step-length", f"{STEP_LENGTH:g}", "world step"),
         ("collision.action", "warn", "colliding vehicles must not vanish"),
@@ -110,8 +111,11 @@ def _overrides(configuration: Configuration, seed: int, begin: float) -> tuple[O
     step = seconds(options.get("step-length", "1"), "step-length")
     if step > STEP_LENGTH and "default.action-step-length" not in options:
         wanted.append(("default.action-step-length", f"{step:g}", "drivers keep their reaction interval"))
-    wanted += [(name, os.devnull, "nothing is written for a run") for name in configuration.outputs]
-    never = {"save-state.times": "1e9", "save-state.period": "-1"}
+    if begin != seconds(options.get("begin", "0"), "begin"):
+        wanted.append(("begin", f"{begin:.12g}", "asked for"))
+    outputs = {name: _NUMBERED.get(name, os.devnull) for name in configuration.outputs}
+    wanted += [(name, used, "nothing is written for a run") for name, used in outputs.items()]
+    never = {"save-state.times": "1e9", "save-state.period": "-1", "save-state.files": os.devnull}
     wanted += [(name, used, "nothing is written for a run") for name, used in never.items() if name in options]
     wanted += [
         (name, "", "files of the terminal-less run")

@@ -1,7 +1,7 @@
 """A user's sumocfg: which files it reads, which options it sets, which outputs it asks for."""
 
 import difflib
-import gzip
+import math
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -10,7 +10,7 @@ import msgspec
 
 from dvca_sumo.scenario.errors import ScenarioError
 
-# SUMO accepts each option under several names; values here are the names SUMO prints in --help.
+# SUMO accepts options under several names; values here are the names SUMO prints in --help.
 SYNONYMS = {
     "net": "net-file",
     "n": "net-file",
@@ -20,17 +20,27 @@ SYNONYMS = {
     "a": "additional-files",
     "b": "begin",
     "e": "end",
-    "tripinfo": "tripinfo-output",
+    "v": "verbose",
+    "X": "xml-validation",
+    "g": "gui-settings-file",
+    "srand": "seed",
+    "abs-rand": "random",
+    "no-duration-log": "duration-log.disable",
+    "routing-threads": "device.rerouting.threads",
+    "ndump": "netstate-dump",
     "netstate": "netstate-dump",
-    "emissions": "emission-output",
+    "netstate-output": "netstate-dump",
+    "tripinfo": "tripinfo-output",
+    "personinfo": "personinfo-output",
     "summary": "summary-output",
     "vehroutes": "vehroute-output",
-    "vehroute": "vehroute-output",
-    "fcd": "fcd-output",
-    "collision": "collision-output",
+    "personroutes": "personroute-output",
+    "person-fcd": "person-fcd-output",
+    "statistics-output": "statistic-output",
     "log-file": "log",
     "l": "log",
-    "M": "mesosim",
+    "C": "save-configuration",
+    "save-config": "save-configuration",
 }
 
 # Options that make SUMO write a file, beside all that end in "-output".
@@ -47,11 +57,11 @@ OUTPUTS = frozenset(
         "device.taxi.idle-algorithm.output",
         "pedestrian.jupedsim.wkt",
         "pedestrian.jupedsim.py",
-        "save-configuration",
-        "save-template",
-        "save-schema",
     ]
 )
+
+# With these SUMO writes a file about its options and leaves.
+_LEAVES = ("save-configuration", "save-template", "save-schema")
 
 
 class Configuration(msgspec.Struct, frozen=True):
@@ -74,7 +84,7 @@ def read_configuration(path: Path) -> Configuration:
 
     Raises:
         ScenarioError: The file, or one that it names, is missing or is not XML, or it cannot be run
-            by this tool (mesoscopic model).
+            by this tool (mesoscopic model, nothing but its options saved).
     """
     path = path.resolve()
     if path.is_dir():
@@ -83,7 +93,7 @@ def read_configuration(path: Path) -> Configuration:
         raise ScenarioError(f"no such SUMO configuration: {path}{_nearest(path)}")
     try:
         root = ET.parse(path).getroot()  # noqa: S314 - the user's own file, read as SUMO itself reads it
-    except ET.ParseError as error:
+    except (ET.ParseError, LookupError, ValueError) as error:  # the latter two of a foreign encoding
         raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
     options: dict[str, str] = {}
     for element in root.iter():
@@ -92,6 +102,9 @@ def read_configuration(path: Path) -> Configuration:
             options[SYNONYMS.get(element.tag, element.tag)] = value
     if options.get("mesosim", "false").lower() in ("true", "1", "yes", "on"):
         raise ScenarioError(f"{path} asks for the mesoscopic model (mesosim), in which no ego can be moved")
+    for name in _LEAVES:
+        if name in options:
+            raise ScenarioError(f"{path} makes SUMO write a file and leave without a simulation ({name})")
     nets = _files(path, options, "net-file")
     if not nets:
         raise ScenarioError(f"{path} is not a SUMO configuration with a net: option net-file is not set")
@@ -113,15 +126,11 @@ def seconds(text: str, option: str) -> float:
     try:
         parts = [float(part) for part in text.strip().split(":")]
     except ValueError:
-        raise ScenarioError(f"option {option} is no time: {text!r} (allowed: seconds, H:M:S or D:H:M:S)") from None
+        parts = []
+    if len(parts) not in (1, 3, 4) or not all(map(math.isfinite, parts)):
+        raise ScenarioError(f"option {option} is no time: {text!r} (allowed: seconds, H:M:S or D:H:M:S)")
     factors = (86400.0, 3600.0, 60.0, 1.0)
     return sum(part * factor for part, factor in zip(parts, factors[-len(parts) :], strict=True))
-
-
-def opened_text(path: Path) -> str:
-    """The text of a plain or gzipped file, as SUMO reads both."""
-    raw = path.read_bytes()
-    return (gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw).decode(errors="replace")
 
 
 def _files(config: Path, options: dict[str, str], name: str) -> tuple[Path, ...]:

@@ -5,8 +5,9 @@ import io
 import re
 import xml.etree.ElementTree as ET
 
-from dvca_sumo.scenario.configuration import Configuration, opened_text
+from dvca_sumo.scenario.configuration import Configuration
 from dvca_sumo.scenario.errors import ScenarioError
+from dvca_sumo.scenario.texts import texts_within
 
 AUTO = "auto"
 _VEHICLE = re.compile(r"<\s*(vehicle|trip|flow)\b[^>]*?\bid\s*=\s*[\"']([^\"']*)[\"']")
@@ -26,15 +27,14 @@ def find_ego(configuration: Configuration, asked: str | None) -> str:
         return AUTO
     names: list[str] = []
     marked: list[str] = []
-    for path in (*configuration.routes, *configuration.additionals):
-        text = opened_text(path)
+    for path, text in texts_within((*configuration.routes, *configuration.additionals)):
         if "dvca.ego" in text:
             marked.extend(_marked(text, str(path)))
         for element, name in _VEHICLE.findall(text):
             names.append(f"{name}.0" if element == "flow" else name)
     flows = {name.rsplit(".", 1)[0] for name in names if name.endswith(".0")}
     if asked is not None:
-        if asked in names or asked.rsplit(".", 1)[0] in flows:
+        if asked in names or asked.rpartition(".")[0] in flows:
             return asked
         close = difflib.get_close_matches(asked, names, n=1)
         hint = f"did you mean {close[0]}?" if close else _candidates(names)
@@ -59,8 +59,8 @@ def arrival_position(configuration: Configuration, ego: str) -> float | None:
     Raises:
         ScenarioError: The definition holds something that is no position.
     """
-    for path in (*configuration.routes, *configuration.additionals):
-        for match in _VEHICLE.finditer(text := opened_text(path)):
+    for _, text in texts_within((*configuration.routes, *configuration.additionals)):
+        for match in _VEHICLE.finditer(text):
             name = match.group(2)
             if name == ego or (match.group(1) == "flow" and ego.rpartition(".")[0] == name):
                 tag = text[match.start() : text.index(">", match.start())]
@@ -90,8 +90,8 @@ def _marked(text: str, path: str) -> list[str]:
     current: ET.Element | None = None
     try:
         for event, element in ET.iterparse(io.StringIO(text), ("start", "end")):  # noqa: S314 - the user's own file
-            if event == "start" and element.tag in ("vehicle", "trip", "flow"):
-                current = element
+            if element.tag in ("vehicle", "trip", "flow"):
+                current = element if event == "start" else None
             elif event == "end" and current is not None and _is_mark(element):
                 name = current.get("id", "")
                 found.append(f"{name}.0" if current.tag == "flow" else name)

@@ -1,6 +1,6 @@
-"""Copies of additional files whose outputs go nowhere.
+"""Copies of net and additional files whose outputs go nowhere.
 
-Detectors and similar elements name their own output file, relative to the additional file. A run
+Detectors and similar elements name their own output file, relative to the file they stand in. A run
 must not write into the user's folder, so files with such elements are copied with the output
 attribute pointed to the null device and every relative input path made absolute.
 """
@@ -10,8 +10,8 @@ import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from dvca_sumo.scenario.configuration import opened_text
 from dvca_sumo.scenario.errors import ScenarioError
+from dvca_sumo.scenario.texts import opened_text
 
 # Element -> attribute with the path of a file that SUMO writes.
 WRITTEN = {
@@ -31,16 +31,19 @@ WRITTEN = {
 }
 # Element -> attribute with the path of a file that SUMO reads.
 _READ = {"variableSpeedSign": "file", "rerouter": "file", "include": "href", "poly": "imgFile", "poi": "imgFile"}
-_SUSPICIOUS = re.compile(r"<\s*(?:" + "|".join([*WRITTEN, "include"]) + r")\b")
+_DETECTOR_FILE = "file"  # parameter of an actuated traffic light: where its own detectors write
+_SUSPICIOUS = re.compile(
+    r"<\s*(?:" + "|".join([*WRITTEN, "include"]) + r")\b|\bkey\s*=\s*[\"']" + _DETECTOR_FILE + r"[\"']"
+)
 
 
-def silenced(additionals: tuple[Path, ...], folder: Path) -> tuple[Path, ...]:
-    """The same additional files, in order, those that write output replaced by silent copies in `folder`.
+def silenced(files: tuple[Path, ...], folder: Path) -> tuple[Path, ...]:
+    """The same files, in order, those that write output replaced by silent copies in `folder`.
 
     Raises:
         ScenarioError: A file to be copied is not well-formed XML.
     """
-    return tuple(_silenced(path, folder / str(number)) for number, path in enumerate(additionals))
+    return tuple(_silenced(path, folder / str(number)) for number, path in enumerate(files))
 
 
 def _silenced(path: Path, folder: Path) -> Path:
@@ -55,6 +58,10 @@ def _silenced(path: Path, folder: Path) -> Path:
         written = WRITTEN.get(element.tag)
         if written is not None and element.get(written):
             element.set(written, os.devnull)
+        if element.tag == "tlLogic":
+            for parameter in element.iter("param"):
+                if parameter.get("key") == _DETECTOR_FILE:
+                    parameter.set("value", os.devnull)
         read = _READ.get(element.tag)
         source = element.get(read) if read is not None else None
         if read is not None and source:

@@ -17,6 +17,7 @@ __all__ = ["ControlCommandError", "Ego", "Entry", "Vehicle", "VehicleLimits", "W
 
 RADIUS = 150.0  # [m] around an ego within which other bodies are observed; beyond every sensor's range
 AUTO_DELAY = 60.0  # [s] after the begin, so that a chosen ego meets traffic
+LONGEST_DELAY = 600.0  # [s] beyond its departure time an ego's road will not clear any more
 _AUTO_CLASSES = ("passenger", "private", "taxi", "evehicle")
 
 
@@ -88,12 +89,14 @@ class World:
             is_fit: Of a vehicle that `auto` may choose: whether its trip can be driven.
 
         Raises:
-            ScenarioError: It never departs before the scenario ends.
+            ScenarioError: It never departs before the scenario ends, or finds no room to.
         """
         wanted, end = self._scenario.ego, self._scenario.end
         earliest = self._scenario.begin + AUTO_DELAY
         while (end is None or self.time < end) and not self._session.is_exhausted:
             self._session.step()
+            if self._session.delay(wanted) > LONGEST_DELAY:
+                raise ScenarioError(f"the ego {wanted!r} finds no room to depart until {self.time:g} s")
             for name in self._session.departed():
                 if name == wanted:
                     return self._session.entry(name, settings)

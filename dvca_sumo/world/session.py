@@ -8,7 +8,6 @@ Rules of this file:
 """
 
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -79,11 +78,13 @@ class Session:
             raise ScenarioError("a simulation is already loaded in this process")
         types = folder / "ego.add.xml"
         types.write_text(f'<additional><vType id="{NEVER_TELEPORTED}" timeToTeleport="-1"/></additional>')
-        additionals = (*silenced(scenario.configuration.additionals, folder), types)
-        os.chdir(folder)  # what a device writes relative to the working folder
+        read = scenario.configuration
+        net, *additionals = silenced((read.net, *read.additionals), folder)
+        files = ("-n", str(net), "-a", ",".join(map(str, (*additionals, types))))
         try:
-            libsumo.start(["sumo", *scenario.arguments, "-a", ",".join(map(str, additionals))])
+            libsumo.start(["sumo", *scenario.arguments, *files])
         except _GIVES_UP as error:
+            libsumo.close()  # else what it had loaded would stay
             raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {_in_one_line(error)}") from None
         self._bodies: dict[str, tuple[ObjectClass, float, float]] = {}
 
@@ -111,6 +112,13 @@ class Session:
     def departed(self) -> tuple[str, ...]:
         """Vehicles inserted in the last step."""
         return tuple(libsumo.simulation.getDepartedIDList())
+
+    def delay(self, vehicle: str) -> float:
+        """How long a vehicle has been waiting for room to depart [s]; 0 before its time and while it is not known."""
+        try:
+            return max(0.0, float(libsumo.vehicle.getDepartDelay(vehicle)))
+        except libsumo.TraCIException:
+            return 0.0
 
     def has(self, vehicle: str) -> bool:
         """Whether the vehicle is in the simulation (inserted and not removed)."""

@@ -33,6 +33,8 @@ from dvca_sumo.truth import EgoTruth, Moment, ObjectsTruth
 
 SHAPE = VehicleShape(length=4.6, width=1.8, wheelbase=2.8, rear_overhang=1.0)  # front bumper 3.6 m ahead
 RED = {"tls/0": SignalColour.RED}
+AT_REST = State(0, 0, 0)
+NO_FUTURES = Futures()
 
 
 class Thing(msgspec.Struct, frozen=True):
@@ -119,7 +121,7 @@ def predicted(things: Sequence[Thing], time: float = 0.0, hypotheses: int = 1) -
     """Each keeps its velocity, so many times over."""
     owners = np.repeat(np.arange(len(things)), hypotheses)
     poses = np.empty((len(owners), len(PREDICTION_TIMES), 3))
-    for row, owner in enumerate(owners):
+    for row, owner in enumerate(owners.tolist()):
         thing = things[owner]
         poses[row, :, 0] = thing.x + PREDICTION_TIMES * thing.speed[0]
         poses[row, :, 1] = thing.y + PREDICTION_TIMES * thing.speed[1]
@@ -157,9 +159,9 @@ def occasion(
     believed: LocalizationEstimate | None = None,
     index: int = 0,
     elapsed: float = 0.0,
-    state: State = State(0, 0, 0),
+    state: State = AT_REST,
     route: Route | None = None,
-    futures: Futures = Futures(),
+    futures: Futures = NO_FUTURES,
     component: Component = Component.PERCEPTION,
 ) -> Occasion:
     now = moment(things, who)

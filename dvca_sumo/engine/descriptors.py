@@ -1,0 +1,53 @@
+"""Open files of a forked process.
+
+A fork shares file offsets: SUMO reads routes piecemeal, and two processes that read through one
+descriptor steal each other's vehicles. What is written by one appears in the other's file.
+"""
+
+import contextlib
+import fcntl
+import os
+import stat
+from pathlib import Path
+
+_PROC = Path("/proc/self/fd")  # Linux
+_FOLDER = _PROC if _PROC.is_dir() else Path("/dev/fd")
+_F_GETPATH = 50  # sys/fcntl.h of macOS
+
+
+def make_own(log: str) -> None:
+    """Give this process offsets of its own.
+
+    Regular files open for reading are opened anew at the same offset, those open for writing are
+    pointed to the null device, and standard output and error to `log`.
+    """
+    descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    null = os.open(os.devnull, os.O_WRONLY)
+    kept = {descriptor, null}
+    for number in [int(entry.name) for entry in _FOLDER.iterdir()]:
+        if number > 2 and number not in kept:
+            with contextlib.suppress(OSError):  # the listing's own descriptor is closed by now
+                _own(number, null)
+    os.dup2(descriptor, 1)
+    os.dup2(descriptor, 2)
+    os.close(descriptor)
+    os.close(null)
+
+
+def _own(number: int, null: int) -> None:
+    if not stat.S_ISREG(os.fstat(number).st_mode):
+        return
+    if fcntl.fcntl(number, fcntl.F_GETFL) & os.O_ACCMODE != os.O_RDONLY:
+        os.dup2(null, number)
+        return
+    offset = os.lseek(number, 0, os.SEEK_CUR)
+    again = os.open(_path_of(number), os.O_RDONLY)
+    os.lseek(again, offset, os.SEEK_SET)
+    os.dup2(again, number)
+    os.close(again)
+
+
+def _path_of(number: int) -> str:
+    if _FOLDER is _PROC:
+        return str(_PROC / str(number))  # opens the file itself, even one that was unlinked
+    return fcntl.fcntl(number, _F_GETPATH, bytes(1024)).rstrip(b"\0").decode()

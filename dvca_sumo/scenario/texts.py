@@ -1,0 +1,50 @@
+"""The text of a user's XML files, as SUMO reads them: gzipped or not, in any encoding, with what they include."""
+
+import gzip
+import re
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+from dvca_sumo.scenario.errors import ScenarioError
+
+_ENCODING = re.compile(rb"<\?xml[^>]*\bencoding\s*=\s*[\"']([A-Za-z0-9._-]+)")
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_INCLUDE = re.compile(r"<\s*include\b[^>]*?\bhref\s*=\s*[\"']([^\"']*)")
+
+
+def opened_text(path: Path) -> str:
+    """The text of a plain or gzipped file.
+
+    Raises:
+        ScenarioError: The file cannot be read.
+    """
+    try:
+        raw = path.read_bytes()
+        plain = gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw
+    except (OSError, EOFError, zlib.error) as error:
+        raise ScenarioError(f"{path} cannot be read: {error}") from None
+    declared = _ENCODING.match(plain)
+    try:
+        return plain.decode(declared.group(1).decode() if declared else "utf-8", errors="replace").lstrip("\ufeff")
+    except LookupError as error:
+        raise ScenarioError(f"{path} cannot be read: {error}") from None
+
+
+def texts_within(paths: tuple[Path, ...]) -> Iterator[tuple[Path, str]]:
+    """Files and all that they include, each once, in order; comments are blanked out line by line.
+
+    Raises:
+        ScenarioError: A file cannot be read.
+    """
+    waiting, seen = list(paths)[::-1], set(paths)
+    while waiting:
+        path = waiting.pop()
+        text = opened_text(path)
+        if "<!--" in text:
+            text = _COMMENT.sub(lambda comment: "\n" * comment.group().count("\n"), text)
+        yield path, text
+        included = [(path.parent / name).resolve() for name in _INCLUDE.findall(text)]
+        fresh = [one for one in dict.fromkeys(included) if one not in seen and one.is_file()]
+        waiting.extend(fresh[::-1])
+        seen.update(fresh)

@@ -1,0 +1,172 @@
+"""A sumocfg as SUMO reads it: option names, times, the files it names, and what cannot be run."""
+
+import subprocess
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+import sumolib
+from small_scenarios import scenario_file
+
+from dvca_sumo.scenario import ScenarioError
+from dvca_sumo.scenario.configuration import OUTPUTS, SYNONYMS, read_configuration, seconds
+
+# Options this tool reads or overrides, beside those that make SUMO write a file.
+LOOKED_AT = {
+    "net-file",
+    "route-files",
+    "additional-files",
+    "begin",
+    "end",
+    "step-length",
+    "seed",
+    "random",
+    "mesosim",
+    "collision.action",
+    "default.action-step-length",
+    "threads",
+    "device.rerouting.threads",
+    "remote-port",
+    "verbose",
+    "xml-validation",
+    "duration-log.disable",
+    "gui-settings-file",
+    "output-prefix",
+    "save-configuration",
+    "save-template",
+    "save-schema",
+}
+
+
+@pytest.fixture
+def net(tmp_path: Path) -> Path:
+    """Only its being there matters here."""
+    path = tmp_path / "some.net.xml"
+    path.write_text("<net/>")
+    return path
+
+
+@pytest.fixture(scope="module")
+def template(tmp_path_factory: pytest.TempPathFactory) -> ET.Element:
+    """All options of the installed SUMO, as it describes them itself."""
+    path = tmp_path_factory.mktemp("template") / "template.xml"
+    subprocess.run(  # noqa: S603 our own command
+        [sumolib.checkBinary("sumo"), "--save-template", str(path)], check=True, capture_output=True
+    )
+    return ET.parse(path).getroot()  # noqa: S314 written in the line above
+
+
+def is_output(option: ET.Element) -> bool:
+    return option.get("type") == "FILE" and (option.tag in OUTPUTS or option.tag.endswith("-output"))
+
+
+def test_every_option_that_counts_is_known_under_all_names_that_sumo_gives_it(template: ET.Element) -> None:
+    counting = [option for option in template.iter() if option.tag in LOOKED_AT or is_output(option)]
+    names = {name: option.tag for option in counting for name in option.get("synonymes", "").split()}
+    assert "summary" in names
+    assert {name: SYNONYMS.get(name) for name in names} == names
+
+
+def test_every_file_that_sumo_says_it_saves_is_an_output(template: ET.Element) -> None:
+    saved = {
+        option.tag
+        for option in template.iter()
+        if option.get("type") == "FILE"
+        and option.get("help", "").startswith(("Save", "Write", "Record"))
+        and not option.tag.startswith("save-")
+    }
+    assert "fcd-output" in saved
+    assert {name for name in saved if name not in OUTPUTS and not name.endswith("-output")} == set()
+
+
+def test_an_option_may_be_given_by_value_or_v_at_any_depth_and_under_a_short_name(tmp_path: Path, net: Path) -> None:
+    config = tmp_path / "run.sumocfg"
+    config.write_text(f'<configuration><input><n v="{net}"/></input><time><b value="0:0:10"/></time></configuration>')
+    configuration = read_configuration(config)
+    assert configuration.net == net.resolve()
+    assert configuration.options["begin"] == "0:0:10"
+
+
+def test_lists_of_files_are_taken_apart_and_relative_to_the_configuration(tmp_path: Path, net: Path) -> None:
+    (tmp_path / "a").mkdir()
+    for name in ("one.rou.xml", "two words.rou.xml"):
+        (tmp_path / name).write_text("<routes/>")
+    config = scenario_file(tmp_path / "a", net, route_files="../one.rou.xml, ../two words.rou.xml ,routes.rou.xml")
+    routes = read_configuration(config).routes
+    assert [path.name for path in routes] == ["one.rou.xml", "two words.rou.xml", "routes.rou.xml"]
+    assert all(path.is_absolute() for path in routes)
+
+
+def test_outputs_are_found_under_every_name(tmp_path: Path, net: Path) -> None:
+    config = scenario_file(
+        tmp_path, net, tripinfo="t.xml", log_file="l.txt", device__rerouting__output="w.xml", seed="3"
+    )
+    assert set(read_configuration(config).outputs) == {"tripinfo-output", "log", "device.rerouting.output"}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("3600", 3600.0), ("12.5", 12.5), ("1:00:10", 3610.0), ("00:00:00", 0.0), ("1:3:30:0.5", 99000.5), ("-1", -1.0)],
+)
+def test_times_are_read_in_all_formats_of_sumo(text: str, expected: float) -> None:
+    assert seconds(text, "begin") == expected
+
+
+@pytest.mark.parametrize("text", ["soon", "", "1:2", "1:2:3:4:5", "1::2", "nan", "inf"])
+def test_a_text_that_is_no_time_is_refused_by_its_option(text: str) -> None:
+    with pytest.raises(ScenarioError, match=r"option begin is no time: .*allowed"):
+        seconds(text, "begin")
+
+
+def test_a_missing_configuration_suggests_the_nearest_name(tmp_path: Path, net: Path) -> None:
+    scenario_file(tmp_path, net)
+    with pytest.raises(
+        ScenarioError, match=r"no such SUMO configuration: .*run\.sumcfg \(did you mean run\.sumocfg\?\)"
+    ):
+        read_configuration(tmp_path / "run.sumcfg")
+
+
+def test_a_configuration_in_a_missing_folder_names_the_folder(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"no such folder: .*/nowhere"):
+        read_configuration(tmp_path / "nowhere" / "run.sumocfg")
+
+
+@pytest.mark.parametrize(
+    "text", ["<configuration><net-file", "", "net-file=x", '<?xml version="1.0" encoding="klingon"?><configuration/>']
+)
+def test_a_configuration_that_is_not_xml_is_refused(tmp_path: Path, text: str) -> None:
+    config = tmp_path / "run.sumocfg"
+    config.write_text(text)
+    with pytest.raises(ScenarioError, match=r"run\.sumocfg is not well-formed XML"):
+        read_configuration(config)
+
+
+def test_another_kind_of_xml_is_refused(tmp_path: Path, net: Path) -> None:
+    with pytest.raises(ScenarioError, match="not a SUMO configuration with a net"):
+        read_configuration(net)
+    (tmp_path / "run.sumocfg").write_text("<configuration><route-files value='x'/></configuration>")
+    with pytest.raises(ScenarioError, match="option net-file is not set"):
+        read_configuration(tmp_path / "run.sumocfg")
+
+
+@pytest.mark.parametrize("option", ["net-file", "route-files", "additional-files"])
+def test_a_missing_input_is_named_with_its_option(tmp_path: Path, net: Path, option: str) -> None:
+    config = scenario_file(tmp_path, net, **{option: "some.net.xm"})
+    with pytest.raises(ScenarioError, match=rf"does not exist \({option}\): .*did you mean some\.net\.xml\?"):
+        read_configuration(config)
+
+
+@pytest.mark.parametrize("value", ["true", "1", "yes"])
+def test_the_mesoscopic_model_is_refused(tmp_path: Path, net: Path, value: str) -> None:
+    with pytest.raises(ScenarioError, match="mesosim"):
+        read_configuration(scenario_file(tmp_path, net, mesosim=value))
+
+
+def test_mesosim_switched_off_is_not_refused(tmp_path: Path, net: Path) -> None:
+    assert read_configuration(scenario_file(tmp_path, net, mesosim="false")).net == net.resolve()
+
+
+@pytest.mark.parametrize("option", ["save-configuration", "C", "save-template", "save-schema"])
+def test_a_configuration_that_only_saves_options_is_refused(tmp_path: Path, net: Path, option: str) -> None:
+    with pytest.raises(ScenarioError, match="leave without a simulation"):
+        read_configuration(scenario_file(tmp_path, net, **{option: "out.xml"}))

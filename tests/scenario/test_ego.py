@@ -1,0 +1,148 @@
+"""Which vehicle is the ego, and where it shall arrive."""
+
+import gzip
+from pathlib import Path
+
+import pytest
+from small_scenarios import scenario_file
+
+from dvca_sumo.scenario import AUTO, ScenarioError, arrival_position, load_scenario
+from dvca_sumo.scenario.configuration import read_configuration
+
+MARK = '<param key="dvca.ego" value="true"/>'
+
+
+@pytest.fixture
+def net(tmp_path: Path) -> Path:
+    path = tmp_path / "some.net.xml"
+    path.write_text("<net/>")
+    return path
+
+
+def chosen(folder: Path, net: Path, routes: str, asked: str | None = None, additional: str = "") -> str:
+    return load_scenario(scenario_file(folder, net, routes, additional), asked).ego
+
+
+def test_the_asked_for_vehicle_comes_before_a_marked_one_and_that_before_the_one_called_ego(
+    tmp_path: Path, net: Path
+) -> None:
+    routes = f'<vehicle id="ego"/><trip id="a">{MARK}</trip><vehicle id="b"/>'
+    assert chosen(tmp_path, net, routes, "b") == "b"
+    assert chosen(tmp_path, net, routes) == "a"
+    assert chosen(tmp_path, net, routes.replace(MARK, "")) == "ego"
+    assert chosen(tmp_path, net, routes, AUTO) == AUTO
+
+
+def test_without_any_the_candidates_are_listed(tmp_path: Path, net: Path) -> None:
+    routes = "".join(f'<vehicle id="v{number}"/>' for number in range(7))
+    with pytest.raises(ScenarioError, match=r"names no ego: use --ego ID.*candidates: v0, v1, v2, v3, v4 and 2 more"):
+        chosen(tmp_path, net, routes)
+
+
+def test_a_scenario_without_vehicles_says_so(tmp_path: Path, net: Path) -> None:
+    with pytest.raises(ScenarioError, match="the scenario has no vehicles"):
+        chosen(tmp_path, net, '<person id="ego"/>')
+
+
+def test_an_unknown_vehicle_suggests_the_nearest(tmp_path: Path, net: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"no vehicle 'vehicel' in the scenario \(did you mean vehicle\?\)"):
+        chosen(tmp_path, net, '<vehicle id="vehicle"/><vehicle id="x"/>', "vehicel")
+    with pytest.raises(ScenarioError, match=r"no vehicle 'zzz' .*candidates: vehicle, x"):
+        chosen(tmp_path, net, '<vehicle id="vehicle"/><vehicle id="x"/>', "zzz")
+
+
+@pytest.mark.parametrize("asked", ["many.0", "many.12"])
+def test_a_vehicle_of_a_flow_can_be_asked_for(tmp_path: Path, net: Path, asked: str) -> None:
+    assert chosen(tmp_path, net, '<flow id="many" number="20"/>', asked) == asked
+
+
+def test_a_flow_itself_is_no_vehicle(tmp_path: Path, net: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"did you mean many\.0\?"):
+        chosen(tmp_path, net, '<flow id="many" number="20"/>', "many")
+
+
+def test_a_marked_flow_gives_its_first_vehicle(tmp_path: Path, net: Path) -> None:
+    assert chosen(tmp_path, net, f'<flow id="many" number="20">{MARK}</flow>') == "many.0"
+
+
+def test_two_marked_vehicles_are_one_too_many(tmp_path: Path, net: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"several vehicles are marked dvca\.ego: a, b; choose one"):
+        chosen(tmp_path, net, f'<vehicle id="a">{MARK}</vehicle><vehicle id="b">{MARK}</vehicle>')
+
+
+def test_a_marked_person_does_not_make_the_vehicle_before_it_the_ego(tmp_path: Path, net: Path) -> None:
+    with pytest.raises(ScenarioError, match="names no ego"):
+        chosen(tmp_path, net, f'<vehicle id="a"/><person id="b">{MARK}</person>')
+
+
+def test_a_vehicle_in_a_comment_is_none(tmp_path: Path, net: Path) -> None:
+    with pytest.raises(ScenarioError, match="candidates: a"):
+        chosen(tmp_path, net, '<!-- <vehicle id="ego"/> --><vehicle id="a"/>')
+
+
+def test_an_ego_is_found_in_additional_and_included_files(tmp_path: Path, net: Path) -> None:
+    (tmp_path / "deeper").mkdir()
+    (tmp_path / "deeper" / "more.xml").write_text('<routes><include href="most.xml"/></routes>')
+    (tmp_path / "deeper" / "most.xml").write_text(
+        '<routes><include href="more.xml"/><vehicle id="ego" arrivalPos="7"/></routes>'
+    )
+    config = scenario_file(tmp_path, net, "", '<include href="deeper/more.xml"/>')
+    assert load_scenario(config).ego == "ego"
+    assert arrival_position(read_configuration(config), "ego") == 7.0
+
+
+def test_a_marked_ego_is_found_in_a_gzipped_file(tmp_path: Path, net: Path) -> None:
+    config = scenario_file(tmp_path, net, route_files="r.xml.gz")
+    (tmp_path / "r.xml.gz").write_bytes(gzip.compress(f'<routes><trip id="a">{MARK}</trip></routes>'.encode()))
+    assert load_scenario(config).ego == "a"
+
+
+def test_names_are_read_in_the_encoding_that_the_file_declares(tmp_path: Path, net: Path) -> None:
+    config = scenario_file(tmp_path, net)
+    text = f'<?xml version="1.0" encoding="ISO-8859-1"?><routes><trip id="Käfer">{MARK}</trip></routes>'
+    (tmp_path / "routes.rou.xml").write_bytes(text.encode("latin-1"))
+    assert load_scenario(config).ego == "Käfer"
+
+
+def test_a_broken_gzip_file_is_refused_in_one_line(tmp_path: Path, net: Path) -> None:
+    config = scenario_file(tmp_path, net, route_files="r.xml.gz")
+    (tmp_path / "r.xml.gz").write_bytes(gzip.compress(b"<routes/>")[:-9])
+    with pytest.raises(ScenarioError, match=r"^[^\n]*r\.xml\.gz cannot be read[^\n]*$"):
+        load_scenario(config)
+
+
+def test_a_marked_vehicle_in_a_file_that_is_not_xml_names_the_file(tmp_path: Path, net: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"routes\.rou\.xml is not well-formed XML"):
+        chosen(tmp_path, net, f'<vehicle id="a">{MARK}</vehicle><vehicle')
+
+
+@pytest.mark.parametrize(
+    ("attribute", "expected"),
+    [
+        ("", None),
+        ('arrivalPos="max"', None),
+        ('arrivalPos="random"', None),
+        ('arrivalPos="-5.5"', -5.5),
+        ("arrivalPos='30'", 30.0),
+    ],
+)
+def test_the_arrival_position_is_the_vehicles_own(
+    tmp_path: Path, net: Path, attribute: str, expected: float | None
+) -> None:
+    other = '<vehicle id="other" arrivalPos="99"/>'
+    commented = '<!-- <vehicle id="ego" arrivalPos="98"/> -->'
+    config = scenario_file(
+        tmp_path, net, f'{other}{commented}<vehicle\n  depart="0" id="ego"\n {attribute}>{MARK}</vehicle>'
+    )
+    assert arrival_position(read_configuration(config), "ego") == expected
+
+
+def test_the_arrival_position_of_a_flow_is_that_of_its_vehicles(tmp_path: Path, net: Path) -> None:
+    config = scenario_file(tmp_path, net, '<flow id="f" number="3" arrivalPos="12"/>')
+    assert arrival_position(read_configuration(config), "f.2") == 12.0
+
+
+def test_an_arrival_position_that_is_none_is_refused(tmp_path: Path, net: Path) -> None:
+    config = scenario_file(tmp_path, net, '<vehicle id="ego" arrivalPos="center"/>')
+    with pytest.raises(ScenarioError, match=r"arrivalPos of ego is no position: 'center' \(allowed: metres, max"):
+        arrival_position(read_configuration(config), "ego")

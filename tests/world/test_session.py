@@ -1,0 +1,266 @@
+"""SUMO's truth in the project's conventions: who is there, where, how big; and what SUMO does to an ego."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from small_scenarios import EGO, in_child, scenario_file
+from watched_world import STANDING, asked, entered, objects_of, watched
+
+from dvca_sumo.messages import ObjectClass, SignalColour
+from dvca_sumo.scenario import ScenarioError, load_scenario
+from dvca_sumo.world import World
+
+CAR_IN_THE_WAY = (
+    '<vehicle id="stopped" depart="0" departPos="60"><route edges="bc"/>'
+    '<stop lane="bc_0" endPos="61" duration="1000"/></vehicle>'
+)
+
+
+def test_an_ego_enters_as_sumo_put_it_there(tmp_path: Path, street: Path) -> None:
+    mark = '<param key="dvca.ttc" value="0.7"/><param key="other" value="1"/>'
+    routes = (
+        '<vType id="van" length="6" width="2.1" vClass="delivery"/>'
+        '<vehicle id="ego" type="van" depart="2.5" departPos="20" departSpeed="5" departLane="1">'
+        f'<route edges="bc cb"/>{mark}</vehicle>'
+    )
+    entry = entered(scenario_file(tmp_path, street, routes), settings=("ttc", "safe_distance"))
+    assert (entry.ego, entry.time, entry.vehicle_class) == ("ego", 2.6, "delivery")
+    assert (entry.length, entry.width) == (6.0, 2.1)
+    assert (entry.edges, entry.lane, entry.position) == (("bc", "cb"), "bc_1", 20.0)
+    assert entry.parameters == {"ttc": "0.7"}
+    assert entry.heading == pytest.approx(0.0)
+    assert entry.front_y == pytest.approx(-1.6)
+    assert entry.speed == 5.0
+
+
+def test_the_ego_stands_where_sumo_had_it_and_is_seen_by_its_own_motion_only(tmp_path: Path, street: Path) -> None:
+    config = scenario_file(tmp_path, street, STANDING)
+    first, *_, last = watched(config, 20, speed=5.0)
+    assert last.ego.x - first.ego.x == pytest.approx(10.0)
+    assert last.ego.speed == pytest.approx(5.0)
+    assert last.time == pytest.approx(first.time + 2.0)
+    assert "ego" not in last.objects.ids
+    x, y = asked(config, 20, lambda sumo: sumo.vehicle.getPosition("ego"), speed=5.0)
+    assert (x, y) == pytest.approx((last.ego.x + last.shape.front, last.ego.y))
+    assert asked(config, 20, lambda sumo: sumo.vehicle.getSpeed("ego"), speed=5.0) == pytest.approx(5.0)
+
+
+def test_vehicles_of_all_sizes_are_boxes_around_their_centre(tmp_path: Path, street: Path) -> None:
+    routes = (
+        '<vType id="bus" vClass="bus" length="12" width="2.5"/>'
+        '<vType id="bike" vClass="bicycle" length="1.6" width="0.6"/>'
+        '<vehicle id="bus" type="bus" depart="0" departPos="220" departLane="1"><route edges="cb"/></vehicle>'
+        '<vehicle id="bike" type="bike" depart="0" departPos="100" departSpeed="4"><route edges="bc"/></vehicle>'
+    )
+    config = scenario_file(tmp_path, street, routes + STANDING)
+    moment = watched(config, 3)[-1]
+    rows, truth = objects_of(moment), moment.objects
+    bus, bike = rows["bus"], rows["bike"]
+    assert (truth.classes[bus], truth.classes[bike]) == (ObjectClass.VEHICLE, ObjectClass.BICYCLE)
+    assert abs(truth.boxes[bus, 2]) == pytest.approx(math.pi)
+    assert truth.boxes[bus, 3:].tolist() == [12.0, 2.5]
+    assert truth.boxes[bike, 2:].tolist() == pytest.approx([0.0, 1.6, 0.6])
+    assert truth.velocities[bike, 0] > 3.0
+    assert truth.velocities[bus] == pytest.approx([-float(np.hypot(*truth.velocities[bus])), 0.0], abs=1e-9)
+    assert (truth.lanes[bus], truth.lanes[bike]) == ("cb_1", "bc_0")
+    bus_x, bus_y = asked(config, 3, lambda sumo: sumo.vehicle.getPosition("bus"))
+    assert truth.boxes[bus, :2].tolist() == pytest.approx([bus_x + 6.0, bus_y])
+
+
+def test_a_parked_car_is_seen_beside_the_road(tmp_path: Path, street: Path) -> None:
+    parked = CAR_IN_THE_WAY.replace("/></vehicle>", ' parking="true"/></vehicle>')
+    moment = watched(scenario_file(tmp_path, street, STANDING + parked), 50)[-1]
+    box = moment.objects.boxes[objects_of(moment)["stopped"]]
+    assert box[1] < -6.4  # the road's edge
+    assert np.hypot(*moment.objects.velocities[0]) == 0.0
+
+
+def test_people_on_foot_are_bodies_and_riders_and_containers_are_not(tmp_path: Path, street: Path) -> None:
+    routes = (
+        '<vehicle id="car" depart="0" departPos="120" departLane="1"><route edges="bc"/></vehicle>'
+        '<person id="walker" depart="0" departPos="50"><walk edges="bc" arrivalPos="-1"/></person>'
+        '<person id="waiting" depart="0" departPos="90"><stop lane="bc_0" duration="100"/></person>'
+        '<person id="late" depart="50" departPos="90"><stop lane="bc_0" duration="100"/></person>'
+        '<person id="rider" depart="triggered"><ride from="bc" to="bc" lines="car"/></person>'
+        '<container id="box" depart="0" departPos="50"><tranship edges="bc" arrivalPos="200"/></container>'
+    )
+    moment = watched(scenario_file(tmp_path, street, STANDING + routes), 20)[-1]
+    assert set(moment.objects.ids) == {"car", "person:walker", "person:waiting"}
+    walker = objects_of(moment)["person:walker"]
+    assert moment.objects.classes[walker] == ObjectClass.PEDESTRIAN
+    assert moment.objects.velocities[walker, 0] == pytest.approx(1.3, abs=0.4)
+    assert moment.objects.boxes[walker, 3] < moment.objects.boxes[walker, 4] < 1.0
+
+
+def test_a_person_with_the_name_of_a_vehicle_is_another_body(tmp_path: Path, street: Path) -> None:
+    person = '<person id="stopped" depart="0" departPos="50"><walk edges="bc" arrivalPos="0"/></person>'
+    moment = watched(scenario_file(tmp_path, street, STANDING + CAR_IN_THE_WAY + person), 60)[-1]
+    rows, truth = objects_of(moment), moment.objects
+    assert set(rows) == {"stopped", "person:stopped"}
+    car, walker = rows["stopped"], rows["person:stopped"]
+    assert truth.boxes[car, 2] == pytest.approx(0.0)
+    assert truth.velocities[car].tolist() == [0.0, 0.0]
+    assert math.cos(truth.boxes[walker, 2]) == pytest.approx(-1.0)
+    assert truth.velocities[walker, 0] < -0.8
+
+
+def test_nobody_beyond_the_radius_is_reported(tmp_path: Path, street: Path) -> None:
+    routes = STANDING + "".join(
+        f'<vehicle id="at{position}" depart="0" departPos="{position}" departLane="1"><route edges="bc"/></vehicle>'
+        for position in (160, 190)
+    )
+    poles = '<poi id="near" type="obstacle.pole" x="360" y="9"/><poi id="far" type="obstacle.pole" x="390" y="9"/>'
+    moment = watched(scenario_file(tmp_path, street, routes, poles), 0)[-1]
+    assert set(moment.objects.ids) == {"at160", "poi:near"}
+
+
+def test_pois_and_polygons_are_bodies_when_their_type_says_so(tmp_path: Path, street: Path) -> None:
+    additional = (
+        '<poi id="cone" type="obstacle.cone" x="250" y="10" width="0.4" height="0.6" angle="30"/>'
+        '<poi id="tree" type="tree" x="250" y="10"/><poly id="house" type="building" shape="0,0 1,0 1,1" fill="1"/>'
+        '<poly id="wall" type="obstacle.wall" shape="240,20 250,20 250,30" lineWidth="0.5"/>'
+        '<poly id="box" type="obstacle.box" fill="1" shape="240,-20 244,-20 244,-22 240,-22"/>'
+    )
+    moment = watched(scenario_file(tmp_path, street, STANDING, additional), 0)[-1]
+    rows, boxes = objects_of(moment), moment.objects.boxes
+    assert set(rows) == {"poi:cone", "polygon:wall#0", "polygon:wall#1", "polygon:box"}
+    assert boxes[rows["poi:cone"]].tolist() == pytest.approx([250.0, 10.0, math.radians(60.0), 0.6, 0.4])
+    assert boxes[rows["polygon:wall#1"]].tolist() == pytest.approx([250.0, 25.0, math.pi / 2, 10.0, 0.5])
+    assert sorted(boxes[rows["polygon:box"], 3:]) == pytest.approx([2.0, 4.0])
+    assert set(moment.objects.classes.tolist()) == {ObjectClass.STATIC}
+
+
+def test_signals_show_their_colour_for_the_egos_movement(tmp_path: Path, street: Path) -> None:
+    shown = {
+        "r": SignalColour.RED,
+        "u": SignalColour.RED,
+        "y": SignalColour.YELLOW,
+        "Y": SignalColour.YELLOW,
+        "G": SignalColour.GREEN,
+        "g": SignalColour.PERMISSIVE,
+        "s": SignalColour.PERMISSIVE,
+        "o": SignalColour.OFF,
+        "O": SignalColour.OFF,
+    }
+    phases = "".join(f'<phase duration="1" state="{letter * 20}"/>' for letter in shown)
+    light = f'<tlLogic id="b" programID="all" type="static">{phases}</tlLogic>'
+    ego = STANDING.replace('from="bc"', 'from="ab"')
+    moments = watched(scenario_file(tmp_path, street, ego, light), 89)
+    assert all(len(moment.signals) == 1 for moment in moments)
+    assert [next(iter(moment.signals.values())) for moment in moments[4::10]] == list(shown.values())
+
+
+def test_a_teleporting_vehicle_is_nowhere(tmp_path: Path, street: Path) -> None:
+    routes = (
+        '<vehicle id="ego" depart="0" departPos="40" departSpeed="0"><route edges="nb bs"/></vehicle>'
+        '<vehicle id="stopped" depart="0" departPos="20"><route edges="sb bn"/>'
+        '<stop lane="sb_0" endPos="40" duration="1000"/></vehicle>'
+        '<vehicle id="jammed" depart="1" departPos="5"><route edges="sb bn"/></vehicle>'
+    )
+    config = scenario_file(tmp_path, street, routes, time_to_teleport="2", tls__all_off="true")
+    moments = watched(config, 150)
+    assert asked(config, 150, lambda sumo: sumo.simulation.getTime()) > 15.0
+    places = [m.objects.boxes[objects_of(m)["jammed"], 1] for m in moments if "jammed" in m.objects.ids]
+    assert max(np.diff(places)) > 20.0  # it was taken past the one in its way
+    assert all(np.abs(moment.objects.boxes).max(initial=0.0) < 1e4 for moment in moments)
+
+
+def test_an_ego_that_stands_longer_than_a_jam_may_last_stays(tmp_path: Path, street: Path) -> None:
+    config = scenario_file(tmp_path, street, STANDING + CAR_IN_THE_WAY, time_to_teleport="2")
+    assert asked(config, 60, lambda sumo: (sumo.vehicle.getRoadID("ego"), sumo.simulation.getTime())) == ("bc", 6.1)
+
+
+def test_an_ego_past_its_arrival_position_stays(tmp_path: Path, street: Path) -> None:
+    config = scenario_file(tmp_path, street, STANDING.replace("/>", ' arrivalPos="40"/>'))
+    assert watched(config, 60, speed=10.0)[-1].ego.x > 280.0
+    assert asked(config, 60, lambda sumo: sumo.vehicle.getIDList(), speed=10.0) == ("ego",)
+
+
+def test_an_ego_past_the_end_of_the_net_stays(tmp_path: Path, street: Path) -> None:
+    config = scenario_file(tmp_path, street, STANDING.replace('"20"', '"270"'))
+    assert watched(config, 60, speed=10.0)[-1].ego.x > 520.0
+    assert asked(config, 60, lambda sumo: sumo.vehicle.getIDList(), speed=10.0) == ("ego",)
+
+
+def test_vehicles_that_collide_with_the_ego_are_not_removed(tmp_path: Path, street: Path) -> None:
+    config = scenario_file(tmp_path, street, STANDING + CAR_IN_THE_WAY, collision__action="remove")
+    moments = watched(config, 70, speed=10.0)
+    gaps = [abs(m.objects.boxes[0, 0] - (m.ego.x + m.shape.centre)) for m in moments]
+    assert min(gaps) < 1.0
+    assert moments[-1].objects.ids == ("stopped",)
+
+
+def test_an_ego_of_a_class_with_a_lane_of_its_own_keeps_class_and_size(tmp_path: Path, street: Path) -> None:
+    routes = '<vType id="bus" vClass="bus" length="12" width="2.5"/>' + STANDING.replace("<trip", '<trip type="bus"')
+    question = lambda sumo: (  # noqa: E731 read where it is used
+        sumo.vehicle.getVehicleClass("ego"),
+        sumo.vehicle.getLength("ego"),
+        sumo.vehicle.getWidth("ego"),
+    )
+    assert asked(scenario_file(tmp_path, street, routes), 5, question) == ("bus", 12.0, 2.5)
+
+
+def test_an_ego_passes_the_stops_that_its_route_asks_of_a_driver(tmp_path: Path, street: Path) -> None:
+    stop = '><stop lane="bc_0" endPos="50" duration="60" parking="true"/></trip>'
+    config = scenario_file(tmp_path, street, STANDING.replace("/>", stop))
+    x, _ = asked(config, 80, lambda sumo: sumo.vehicle.getPosition("ego"), speed=10.0)
+    assert x == pytest.approx(watched(config, 80, speed=10.0)[-1].ego.x + 5.0 * 0.82)
+
+
+@pytest.mark.parametrize("step", ["0.5", "1"])
+def test_drivers_keep_their_reaction_interval(tmp_path: Path, street: Path, step: str) -> None:
+    config = scenario_file(tmp_path, street, STANDING + CAR_IN_THE_WAY, step_length=step)
+    assert asked(config, 1, lambda sumo: sumo.vehicle.getActionStepLength("stopped")) == float(step)
+    assert asked(config, 1, lambda sumo: sumo.simulation.getDeltaT()) == 0.1
+
+
+def test_a_shorter_configured_step_is_lengthened(tmp_path: Path, street: Path) -> None:
+    config = scenario_file(tmp_path, street, STANDING + CAR_IN_THE_WAY, step_length="0.05")
+    answers = asked(config, 1, lambda sumo: (sumo.vehicle.getActionStepLength("stopped"), sumo.simulation.getDeltaT()))
+    assert answers == (0.1, 0.1)
+
+
+@pytest.mark.parametrize(("begin", "asked_for"), [("0:0:10", None), ("10", None), ("0", 10.0)])
+def test_a_simulation_begins_when_it_shall(tmp_path: Path, street: Path, begin: str, asked_for: float | None) -> None:
+    routes = EGO.replace('"0"', '"12"') + CAR_IN_THE_WAY.replace('"0"', '"3"').replace("stopped", "before")
+    config = scenario_file(tmp_path, street, routes, begin=begin)
+
+    def job() -> tuple[float, float, tuple[str, ...]]:
+        import libsumo  # noqa: PLC0415
+
+        world = World(load_scenario(config, begin=asked_for), tmp_path)
+        started = world.time
+        return started, world.await_ego((), lambda _: True).time, libsumo.vehicle.getIDList()
+
+    assert in_child(job) == (10.0, 12.1, ("ego",))
+
+
+def test_a_second_simulation_in_one_process_is_refused(tmp_path: Path, street: Path) -> None:
+    scenario = load_scenario(scenario_file(tmp_path, street))
+
+    def job() -> Any:
+        World(scenario, tmp_path)
+        with pytest.raises(ScenarioError, match="already loaded"):
+            World(scenario, tmp_path)
+
+    in_child(job)
+
+
+def test_worlds_can_follow_each_other_in_one_process(tmp_path: Path, street: Path) -> None:
+    scenario = load_scenario(scenario_file(tmp_path, street))
+    broken = load_scenario(scenario_file(tmp_path / "broken", street, EGO + "<vehicle"))
+
+    def job() -> list[float]:
+        times = []
+        for _ in range(2):
+            with pytest.raises(ScenarioError, match="cannot start"):
+                World(broken, tmp_path)
+            world = World(scenario, tmp_path)
+            times.append(world.await_ego((), lambda _: True).time)
+            world.close()
+        return times
+
+    assert in_child(job) == [0.1, 0.1]
