@@ -1,6 +1,8 @@
 """What one run leaves behind, and its digest."""
 
+import bisect
 import hashlib
+import math
 
 import msgspec
 import numpy as np
@@ -66,6 +68,11 @@ class Record(msgspec.Struct):
             ego.time,
             state_of(self.stations[tick], ego.speed, ego.acceleration),
         )
+
+    def first_at(self, component: Component, time: float) -> int:
+        """Index of the component's first message at or after `time` [s]; the number of messages if there is none."""
+        tick = math.ceil((time - self.start) / TICK - 1e-6)
+        return bisect.bisect_left(self.executions[component], tick, key=lambda execution: execution.tick)
 
     def believed_at(self, tick: int) -> LocalizationEstimate:
         """The localization estimate in force at a tick."""

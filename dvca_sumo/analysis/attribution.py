@@ -111,6 +111,7 @@ def explain(engine: Engine, request: Request, record: Record, progress: Progress
         faults=request.faults,
         futures=recorded_futures(record.moments),
         until=math.inf if is_mission else violation.time + SETTLE,
+        start=record.start,
         is_mission=is_mission,
         jitters=_jitters(request),
     )
@@ -146,7 +147,8 @@ def _steps(found: Attribution, engine: Engine, dtest: Dtest, request: Request) -
     if doubt:
         yield replace(found, verdict=Verdict.NOT_REPRODUCIBLE, is_reproducible=False, reason=doubt)
         return
-    answer = responsible_component(dtest)
+    assert found.violation is not None  # or there would be nothing to explain
+    answer = responsible_component(dtest, found.record, found.violation.time)
     found = replace(found, verdict=answer.verdict, reason=answer.reason, components=answer)
     yield found
     if answer.verdict is Verdict.PLANNING:

@@ -1,17 +1,35 @@
-"""Component level: which component, by the vector of counterfactuals (Algorithm 1, steps 2 and 3)."""
+"""Component level: which component, by the vector of counterfactuals (Algorithm 1, steps 2 and 3).
+
+The questions are asked from the violation backwards: is it prevented when the last 1, 2, 4, 8 ... s are
+ideal? Only what stays unprevented falls back to substitution of the whole drive. Each step rests on an
+assumption of monotonicity:
+
+- in time: what prevents the violation from t on prevents it from any earlier t on too, so the first
+  SAFE answer going backwards stands for Definition 10's substitution of the whole component;
+- in components: what one ideal component prevents, all four together prevent at least as late, so
+  single substitutions are not asked later than where all four are enough;
+- upstream: a component before the one found, if it is enough at all, is so within `UPSTREAM` times the
+  time of the one found.
+
+The conclusion itself rests on none: it is confirmed at two adjacent messages, and a certified run asks
+the whole-component question as well.
+"""
 
 import enum
+from collections.abc import Sequence
 
 import msgspec
 
 from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.analysis.dtest import Dtest, Question
-from dvca_sumo.messages import Component
+from dvca_sumo.messages import Component, MessageId
+from dvca_sumo.record import MessageMark, Record
 
 # In the order of the data flow: an idealized component may hide the fault of one before it.
 SUBSTITUTABLE = (Component.LOCALIZATION, Component.PERCEPTION, Component.PREDICTION, Component.CONTROL)
 
-ALL_IDEAL = Question(SUBSTITUTABLE)
+UPSTREAM = 4
+_VECTOR = 8.0  # [s] before the violation from which single substitutions are shown when none can be enough
 
 
 class Verdict(enum.StrEnum):
@@ -31,19 +49,88 @@ class ComponentAnswer(msgspec.Struct, frozen=True):
     component: Component | None
     alternatives: tuple[Component, ...]  # further single substitutions that suffice
     all_ideal: Outcome
-    singles: dict[Component, Outcome]
+    singles: dict[Component, Outcome]  # at the earliest time each was asked for
     reason: str
 
 
-def responsible_component(dtest: Dtest) -> ComponentAnswer:
-    """Ask the all-ideal question and the four single ones, and conclude.
+def responsible_component(dtest: Dtest, record: Record, time: float) -> ComponentAnswer:
+    """Ask the all-ideal question and the four single ones, backwards from the violation at `time` [s], and conclude.
 
-    Planning, when the violation stays although everything else is ideal. Otherwise the most upstream
-    component whose substitution alone is enough; the others that are enough are alternatives, since a
-    substitute downstream can hide a fault upstream, never the reverse.
+    Planning, when the violation stays although everything else is ideal from the start. Otherwise the
+    most upstream component whose substitution alone is enough; the others that are enough are
+    alternatives, since a substitute downstream can hide a fault upstream, never the reverse.
     """
-    outcomes = dtest.ask_all([ALL_IDEAL, *(Question((component,)) for component in SUBSTITUTABLE)])
-    all_ideal, singles = outcomes[0], dict(zip(SUBSTITUTABLE, outcomes[1:], strict=True))
+    search = _Backwards(dtest, record, time)
+    all_ideal = search.gallop_together()
+    singles = search.gallop_singly() if all_ideal is Outcome.SAFE else search.vector()
+    return _concluded(all_ideal, singles)
+
+
+def lookbacks(start: float, time: float) -> list[float | None]:
+    """1, 2, 4, 8 ... s before `time`, as long as that is after `start`; then None, the whole drive."""
+    found: list[float | None] = []
+    back = 1.0
+    while time - back > start:
+        found.append(back)
+        back *= 2.0
+    return [*found, None]
+
+
+class _Backwards:
+    """The questions of one attribution, asked at earlier and earlier levels."""
+
+    def __init__(self, dtest: Dtest, record: Record, time: float) -> None:
+        self._dtest = dtest
+        self._record = record
+        self._time = time
+        self._levels = lookbacks(record.start, time)
+        self._enough = 0  # level at which all four are enough
+
+    def gallop_together(self) -> Outcome:
+        """All four ideal: SAFE at the first level that is, else what the whole drive says."""
+        outcome = Outcome.UNRESOLVED
+        for level in range(len(self._levels)):
+            (outcome,) = self._ask([SUBSTITUTABLE], level)
+            self._enough = level
+            if outcome is Outcome.SAFE:
+                break
+        return outcome
+
+    def gallop_singly(self) -> dict[Component, Outcome]:
+        """Each alone, from where all four are enough; upstream ones a while longer than the first that is enough."""
+        outcomes = dict.fromkeys(SUBSTITUTABLE, Outcome.UNRESOLVED)
+        open_ones: Sequence[Component] = SUBSTITUTABLE
+        level, last = self._enough, len(self._levels) - 1
+        while open_ones and level <= last:
+            answers = self._ask([(component,) for component in open_ones], level)
+            outcomes.update(zip(open_ones, answers, strict=True))
+            enough = [component for component in SUBSTITUTABLE if outcomes[component] is Outcome.SAFE]
+            if enough and Outcome.SAFE in answers:
+                last = min(last, level + UPSTREAM.bit_length() - 1)
+            first = SUBSTITUTABLE.index(enough[0]) if enough else len(SUBSTITUTABLE)
+            open_ones = [one for one in SUBSTITUTABLE[:first] if outcomes[one] is not Outcome.SAFE]
+            level += 1
+        return outcomes
+
+    def vector(self) -> dict[Component, Outcome]:
+        """Each alone, over the last seconds: to be seen, not to conclude from."""
+        level = next((row for row, back in enumerate(self._levels) if back is None or back >= _VECTOR), 0)
+        answers = self._ask([(component,) for component in SUBSTITUTABLE], level)
+        return dict(zip(SUBSTITUTABLE, answers, strict=True))
+
+    def _ask(self, ideals: Sequence[tuple[Component, ...]], level: int) -> list[Outcome]:
+        return self._dtest.ask_all([Question(ideal, self._since(ideal[0], level)) for ideal in ideals])
+
+    def _since(self, component: Component, level: int) -> MessageMark | None:
+        """The first message of `component` at a level; None where that is its first of all."""
+        back = self._levels[level]
+        if back is None:
+            return None
+        index = self._record.first_at(component, self._time - back)
+        return self._record.mark(MessageId(component, index)) if index > 0 else None
+
+
+def _concluded(all_ideal: Outcome, singles: dict[Component, Outcome]) -> ComponentAnswer:
     enough = tuple(component for component in SUBSTITUTABLE if singles[component] is Outcome.SAFE)
 
     def answer(verdict: Verdict, component: Component | None, reason: str) -> ComponentAnswer:
@@ -53,15 +140,12 @@ def responsible_component(dtest: Dtest) -> ComponentAnswer:
     if all_ideal is Outcome.VIOLATES:
         reason = "the violation stays although every other component is ideal"
         return answer(Verdict.PLANNING, Component.PLANNING, reason)
-    doubtful = [one for one in SUBSTITUTABLE if singles[one] is Outcome.UNRESOLVED]
     if not enough:
         if all_ideal is Outcome.UNRESOLVED:
             return answer(Verdict.UNRESOLVED, None, "the run with all components ideal could not be told")
-        if doubtful:
-            reason = f"runs with ideal {', '.join(doubtful)} could not be told, and no other substitution prevents it"
-            return answer(Verdict.UNRESOLVED, None, reason)
         reason = "no single substitution prevents it, all together do: more than one component takes part"
         return answer(Verdict.UNRESOLVED, None, reason)
+    doubtful = [one for one in SUBSTITUTABLE if singles[one] is Outcome.UNRESOLVED]
     if doubtful and SUBSTITUTABLE.index(doubtful[0]) < SUBSTITUTABLE.index(enough[0]):
         reason = f"the run with ideal {doubtful[0]} could not be told, and it lies upstream of {enough[0]}"
         return answer(Verdict.UNRESOLVED, None, reason)

@@ -14,7 +14,7 @@ from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Engine, Glimpse
 from dvca_sumo.interventions import Fault, Futures, Ideal, Selection, State
 from dvca_sumo.messages import Component
-from dvca_sumo.record import MessageMark
+from dvca_sumo.record import TICK, MessageMark
 from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.violations import Answer, Violation
@@ -54,6 +54,7 @@ class Setting(msgspec.Struct, frozen=True):
     faults: tuple[Fault, ...]
     futures: Futures  # of the factual run, continued past the violation
     until: float  # [s] a probe without a violation up to here is safe; inf: to the end of the scenario
+    start: float  # [s] the ego's departure
     is_mission: bool  # the factual violation is one that only a finished drive can answer
     jitters: tuple[int | None, ...]  # one run of each question for each; (None,) in exact mode
 
@@ -99,6 +100,14 @@ class Dtest:
             self._answers[question] = majority([one.outcome for one in probes if one.question == question])
         return [self._answers[question] for question in questions]
 
+    def known(self, component: Component) -> dict[int, Outcome]:
+        """What is known already of substituting `component` alone, by the index of the first message."""
+        return {
+            0 if question.since is None else question.since.index: outcome
+            for question, outcome in self._answers.items()
+            if question.ideal == (component,)
+        }
+
     def evidence(self, question: Question) -> Probe | None:
         """The first probe of a question, among those that agree with its answer; None when it was not asked."""
         if question not in self._answers:
@@ -121,7 +130,8 @@ class Dtest:
         if since is None:
             return Selection()
         if self._setting.jitters == (None,):
-            return Selection(first=since.index)  # bit-exact: indices of both runs coincide
+            # Runs are bit-exact: the messages of both are made at the same ticks, whatever the component.
+            return Selection(start=since.time - self._setting.start - TICK / 2.0)
         return Selection(from_state=State(*since.state))
 
 

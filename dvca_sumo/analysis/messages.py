@@ -26,13 +26,14 @@ def violation_inducing_message(
 ) -> MessageAnswer:
     """Bisect over the vehicle dynamic states of `component`'s messages, then over messages.
 
-    Whole-run substitution must have been asked and be SAFE. In exact mode the search ends on adjacent
-    messages; else on adjacent states, of which the last message of the safe one is meant. Monotonicity
-    is assumed inside the bracket, and checked one state to either side of the states where it ends.
-    A substitution from a state on begins where a run first meets it, so states met again are not asked of.
+    Starts from what is known of the component: SAFE when ideal from some message on, and VIOLATES from a
+    later one on or, as the factual run shows, when not ideal at all. In exact mode the search ends on
+    adjacent messages; else on adjacent states, of which the last message of the safe one is meant.
+    Monotonicity is assumed inside the bracket, and checked against all that was asked, one state to
+    either side of where the search ends included.
 
     Args:
-        dtest: To ask.
+        dtest: To ask; must know of one substitution of `component` that is SAFE.
         record: The factual run.
         component: The responsible one.
         time: [s] of the violation: a substitution after it is none.
@@ -40,8 +41,6 @@ def violation_inducing_message(
     """
     marks = _marks(record, component, time)
     states = _first_of_states(marks)
-    if not is_exact:
-        states = sorted({marks[row].state: row for row in reversed(states)}.values())
 
     def question(index: int) -> Question:
         return Question((component,), marks[index] if index > 0 else None)
@@ -49,11 +48,11 @@ def violation_inducing_message(
     def test(index: int) -> Outcome:
         return dtest.ask(question(index))
 
-    # M[c][0:] is the whole component, M[c][len:] nothing at all: both ends are proven already.
-    whole = Bracket(0, len(marks))
-    between_states = bisect(test, whole, states)
-    bracket = bisect(test, between_states) if is_exact else between_states
-    is_monotone = _agrees(test, states, between_states)
+    bracket = bisect(test, _bracket(dtest.known(component), len(marks)), states)
+    if is_exact:
+        bracket = bisect(test, bracket)
+    _ask_around(test, states, bracket)
+    is_monotone = _is_monotone(dtest.known(component), bracket)
     low = bracket.low
     if not is_exact:
         state = marks[bracket.low].state
@@ -82,13 +81,26 @@ def _first_of_states(marks: list[MessageMark]) -> list[int]:
     return [row for row, mark in enumerate(marks) if row == 0 or mark.state != marks[row - 1].state]
 
 
+def _bracket(known: dict[int, Outcome], count: int) -> Bracket:
+    low = max(index for index, outcome in known.items() if outcome is Outcome.SAFE)
+    later = [index for index, outcome in known.items() if outcome is Outcome.VIOLATES and index > low]
+    return Bracket(low, min(later, default=count))
+
+
 def _are_neighbours(states: list[int], bracket: Bracket, count: int) -> bool:
-    ends = [*states, count]
-    return ends.index(bracket.high) == ends.index(bracket.low) + 1
+    between = [state for state in [*states, count] if bracket.low < state < bracket.high]
+    return not between
 
 
-def _agrees(test: Callable[[int], Outcome], states: list[int], bracket: Bracket) -> bool:
+def _ask_around(test: Callable[[int], Outcome], states: list[int], bracket: Bracket) -> None:
     before = [one for one in states if 0 < one < bracket.low]
     after = [one for one in states if one > bracket.high]
-    is_safe_before = not before or test(before[-1]) is not Outcome.VIOLATES
-    return is_safe_before and (not after or test(after[0]) is not Outcome.SAFE)
+    for index in (*before[-1:], *after[:1]):
+        test(index)
+
+
+def _is_monotone(known: dict[int, Outcome], bracket: Bracket) -> bool:
+    return not any(
+        (outcome is Outcome.VIOLATES and index < bracket.low) or (outcome is Outcome.SAFE and index > bracket.high)
+        for index, outcome in known.items()
+    )

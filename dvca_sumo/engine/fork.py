@@ -6,6 +6,7 @@ substitutes. What cannot be branched (jitter mode draws every run anew; another 
 stack with threads) goes to the replay engine.
 """
 
+import math
 import multiprocessing
 import os
 import shutil
@@ -25,7 +26,7 @@ from dvca_sumo.engine.processes import Failure, said_in
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.engine.replay import DEFAULT_TIMEOUT, ReplayEngine, raised, roadmap
 from dvca_sumo.interventions import Fault, Ideal
-from dvca_sumo.record import Record
+from dvca_sumo.record import TICK, Record
 from dvca_sumo.run import Task
 from dvca_sumo.stack.reference import stack_factory
 
@@ -180,15 +181,10 @@ class ForkEngine:
         checkpoint.connection.send(Order(row, task, wanted))
 
     def _first_step(self, task: Task) -> int:
-        """World step of the first message that `task` substitutes; without any, the last before the violation."""
-        assert self._record is not None
-        ticks = []
-        for one in task.interventions:
-            if isinstance(one, Ideal):
-                executions = self._record.executions[one.component]
-                ticks.append(executions[min(one.selection.first, len(executions) - 1)].tick)
-        if ticks:
-            return min(ticks) // _TICKS_PER_STEP
+        """World step of the first message that `task` may substitute; without any, some time before the violation."""
+        starts = [one.selection.start for one in task.interventions if isinstance(one, Ideal)]
+        if starts:
+            return math.floor((min(starts) + TICK) / TICK) // _TICKS_PER_STEP
         return min(self._before_violation(), default=0)
 
     def _before_violation(self) -> tuple[int, ...]:

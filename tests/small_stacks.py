@@ -1,0 +1,96 @@
+"""Foreign stacks for tests, as `--stack small_stacks:NAME` finds them: the reference stack with one part exchanged."""
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from dvca_sumo.messages import ControlCommand, LocalizationEstimate, Trajectory
+from dvca_sumo.stack.reference import Stack, StackContext, reference_stack
+
+CRASHING_SEED = 13
+
+
+class Spoilt:
+    """A component that does something else from its call number `call` on."""
+
+    def __init__(self, component: Any, call: int, act: Callable[[], Any]) -> None:
+        self._component, self._left, self._act = component, call, act
+
+    def step(self, *inputs: Any) -> Any:
+        self._left -= 1
+        return self._act() if self._left < 0 else self._component.step(*inputs)
+
+
+class Driver:
+    """Control that accelerates alike for ever."""
+
+    def __init__(self, acceleration: float) -> None:
+        self._acceleration = acceleration
+
+    def step(self, localization: LocalizationEstimate, trajectory: Trajectory | None) -> ControlCommand:  # noqa: ARG002
+        return ControlCommand(localization.time, self._acceleration, 0.0)
+
+
+def spoilt(context: StackContext, component: str, call: int, act: Callable[[], Any]) -> Stack:
+    stack = reference_stack(context)
+    return replace(stack, **{component: Spoilt(getattr(stack, component), call, act)})  # type: ignore[arg-type]
+
+
+def _raise() -> None:
+    raise ZeroDivisionError("the lidar said 0")
+
+
+def _crash() -> None:
+    print("last words", file=sys.stderr, flush=True)  # noqa: T201
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+RAISING_CYCLE = 27
+raising_localization = partial(spoilt, component="localization", call=10 * RAISING_CYCLE + 5, act=_raise)
+raising_perception = partial(spoilt, component="perception", call=RAISING_CYCLE, act=_raise)
+raising_prediction = partial(spoilt, component="prediction", call=RAISING_CYCLE, act=_raise)
+raising_planning = partial(spoilt, component="planning", call=RAISING_CYCLE, act=_raise)
+raising_control = partial(spoilt, component="control", call=10 * RAISING_CYCLE, act=_raise)
+
+silent_planning = partial(spoilt, component="planning", call=RAISING_CYCLE, act=lambda: None)
+wordy_control = partial(spoilt, component="control", call=10 * RAISING_CYCLE, act=lambda: "full speed ahead")
+wild_control = partial(
+    spoilt, component="control", call=10 * RAISING_CYCLE, act=lambda: ControlCommand(0.0, float("nan"), 0.0)
+)
+hanging = partial(spoilt, component="planning", call=5, act=signal.pause)
+leaving = partial(spoilt, component="planning", call=5, act=partial(sys.exit, 3))
+
+
+def crashing_by_seed(context: StackContext) -> Stack:
+    """Crashes the process when the seed is `CRASHING_SEED`."""
+    return spoilt(context, "planning", 5, _crash) if context.seed == CRASHING_SEED else reference_stack(context)
+
+
+def full_throttle(context: StackContext) -> Stack:
+    return replace(reference_stack(context), control=Driver(3.0))
+
+
+def standing(context: StackContext) -> Stack:
+    return replace(reference_stack(context), control=Driver(-3.0))
+
+
+def reading_a_file(context: StackContext) -> Stack:
+    """Needs a file beside which the command was typed."""
+    with open("weights.txt", encoding="utf-8") as file:  # noqa: PTH123 relative on purpose
+        assert file.read() == "7"
+    return reference_stack(context)
+
+
+def refusing(context: StackContext) -> Stack:  # noqa: ARG001
+    raise LookupError("no weights here")
+
+
+def returning_nonsense(context: StackContext) -> Any:  # noqa: ARG001
+    return "a stack"
+
+
+NOT_CALLABLE = 5
