@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.engine.replay import ReplayEngine
-from dvca_sumo.interventions import Intervention
+from dvca_sumo.interventions import Futures, Intervention
 from dvca_sumo.record import Record
 from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import load_scenario
@@ -47,8 +47,10 @@ def driven(
     stop: StopRule = StopRule(),  # noqa: B008 - frozen
     ego: str | None = None,
     seed: int | None = None,
+    jitter: int | None = None,
+    futures: Futures = Futures(),  # noqa: B008 - frozen
 ) -> Record:
     """One run of the scenario at `config`."""
     scenario = load_scenario(config, ego, seed)
     engine = ReplayEngine(scenario.configuration.net, stack, 1, TIMEOUT)
-    return engine.record(Task(scenario, interventions, stop))
+    return engine.record(Task(scenario, interventions, stop, futures, jitter))

@@ -1,5 +1,6 @@
 """Foreign stacks for tests, as `--stack small_stacks:NAME` finds them: the reference stack with one part exchanged."""
 
+import faulthandler
 import os
 import signal
 import sys
@@ -45,6 +46,7 @@ def _raise() -> None:
 
 
 def _crash() -> None:
+    faulthandler.disable()  # pytest's
     print("last words", file=sys.stderr, flush=True)  # noqa: T201
     os.kill(os.getpid(), signal.SIGSEGV)
 

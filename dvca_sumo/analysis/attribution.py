@@ -7,7 +7,7 @@ import msgspec
 from msgspec.structs import replace
 
 from dvca_sumo.analysis.bisection import Outcome
-from dvca_sumo.analysis.components import ComponentAnswer, Verdict, responsible_component
+from dvca_sumo.analysis.components import ComponentAnswer, Verdict, first_questions, responsible_component
 from dvca_sumo.analysis.differences import Difference, differences
 from dvca_sumo.analysis.dtest import Dtest, Probe, Question, Setting
 from dvca_sumo.analysis.messages import MessageAnswer, violation_inducing_message
@@ -16,13 +16,17 @@ from dvca_sumo.analysis.violating import principal
 from dvca_sumo.engine.protocol import Engine, RunFailedError
 from dvca_sumo.interventions import Fault, recorded_futures
 from dvca_sumo.messages import PREDICTION_TIMES, Component, MessageId
-from dvca_sumo.record import MessageMark, Record
+from dvca_sumo.record import TICK, MessageMark, Record
 from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.stack.reference import StackError
 from dvca_sumo.violations import Answer, Category, Violation
 
-SETTLE = 8.0  # [s] past the factual violation without any: a counterfactual run is safe
+# A counterfactual run is safe without any violation until so long after the factual one ...
+SETTLE = 8.0  # [s]
+# ... or so long, when by then it has left the place of the factual violation behind.
+LEAST_SETTLE = 2.0  # [s]
+PAST = 10.0  # [m]
 _HORIZON = float(PREDICTION_TIMES[-1])  # [s] the factual run goes on for, so that its last futures are whole
 
 
@@ -110,13 +114,13 @@ def explain(engine: Engine, request: Request, record: Record, progress: Progress
         scenario=request.scenario,
         faults=request.faults,
         futures=recorded_futures(record.moments),
-        until=math.inf if is_mission else violation.time + SETTLE,
+        stop=StopRule(after_violation=0.0) if is_mission else _settled(record, violation),
         start=record.start,
         is_mission=is_mission,
         jitters=_jitters(request),
     )
     dtest = Dtest(engine, setting, progress.probe)
-    found = replace(found, violation=violation, until=setting.until, verdict=Verdict.UNRESOLVED)
+    found = replace(found, violation=violation, until=setting.stop.at, verdict=Verdict.UNRESOLVED)
     try:
         for answer in _steps(found, engine, dtest, request):
             found = answer
@@ -133,6 +137,13 @@ def attribute(engine: Engine, request: Request, progress: Progress) -> Attributi
     return explain(engine, request, record, progress)
 
 
+def _settled(record: Record, violation: Violation) -> StopRule:
+    place = record.stations[min(round((violation.time - record.start) / TICK), len(record.stations) - 1)]
+    return StopRule(
+        after_violation=0.0, at=violation.time + SETTLE, settled=violation.time + LEAST_SETTLE, place=place + PAST
+    )
+
+
 def _jitters(request: Request) -> tuple[int | None, ...]:
     return (None,) if request.repeats is None else tuple(range(request.repeats))
 
@@ -143,11 +154,13 @@ def _factual_task(request: Request) -> Task:
 
 def _steps(found: Attribution, engine: Engine, dtest: Dtest, request: Request) -> Iterator[Attribution]:
     """The answer after each step of Algorithm 1."""
+    assert found.violation is not None  # or there would be nothing to explain
+    # Asked together: neither concludes anything before the premise has been looked at.
+    dtest.ask_all([Question(()), *first_questions(found.record, found.violation.time)])
     doubt = _premise(engine, dtest, _factual_task(request), found)
     if doubt:
         yield replace(found, verdict=Verdict.NOT_REPRODUCIBLE, is_reproducible=False, reason=doubt)
         return
-    assert found.violation is not None  # or there would be nothing to explain
     answer = responsible_component(dtest, found.record, found.violation.time)
     found = replace(found, verdict=answer.verdict, reason=answer.reason, components=answer)
     yield found
@@ -166,7 +179,10 @@ def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution) ->
     if outcome is Outcome.UNRESOLVED:
         return f"the repeated run could not be told: {probe.reason}"
     digests = found.record.digests
-    if factual.jitter is not None or (probe.steps > 0 and digests[probe.steps - 1 : probe.steps] == [probe.last_step]):
+    is_same = probe.steps > 0 and digests[probe.steps - 1 : probe.steps] == [probe.last_step]
+    if is_same and outcome is Outcome.SAFE:
+        return f"the repeated run is the same, but shows no violation until {found.until:.1f} s"
+    if is_same or factual.jitter is not None:
         return ""
     try:
         again = engine.record(factual).digests

@@ -66,6 +66,21 @@ def responsible_component(dtest: Dtest, record: Record, time: float) -> Componen
     return _concluded(all_ideal, singles)
 
 
+def first_questions(record: Record, time: float) -> list[Question]:
+    """What `responsible_component` will ask first whatever the answers, to be asked ahead."""
+    return [
+        Question(SUBSTITUTABLE, mark_before(record, Component.LOCALIZATION, time, lookbacks(record.start, time)[0]))
+    ]
+
+
+def mark_before(record: Record, component: Component, time: float, back: float | None) -> MessageMark | None:
+    """The first message of `component` from `back` [s] before `time` on; None where that is its first of all."""
+    if back is None:
+        return None
+    index = record.first_at(component, time - back)
+    return record.mark(MessageId(component, index)) if index > 0 else None
+
+
 def lookbacks(start: float, time: float) -> list[float | None]:
     """1, 2, 4, 8 ... s before `time`, as long as that is after `start`; then None, the whole drive."""
     found: list[float | None] = []
@@ -119,15 +134,9 @@ class _Backwards:
         return dict(zip(SUBSTITUTABLE, answers, strict=True))
 
     def _ask(self, ideals: Sequence[tuple[Component, ...]], level: int) -> list[Outcome]:
-        return self._dtest.ask_all([Question(ideal, self._since(ideal[0], level)) for ideal in ideals])
-
-    def _since(self, component: Component, level: int) -> MessageMark | None:
-        """The first message of `component` at a level; None where that is its first of all."""
         back = self._levels[level]
-        if back is None:
-            return None
-        index = self._record.first_at(component, self._time - back)
-        return self._record.mark(MessageId(component, index)) if index > 0 else None
+        marks = [mark_before(self._record, ideal[0], self._time, back) for ideal in ideals]
+        return self._dtest.ask_all([Question(ideal, mark) for ideal, mark in zip(ideals, marks, strict=True)])
 
 
 def _concluded(all_ideal: Outcome, singles: dict[Component, Outcome]) -> ComponentAnswer:
@@ -140,12 +149,15 @@ def _concluded(all_ideal: Outcome, singles: dict[Component, Outcome]) -> Compone
     if all_ideal is Outcome.VIOLATES:
         reason = "the violation stays although every other component is ideal"
         return answer(Verdict.PLANNING, Component.PLANNING, reason)
+    doubtful = [one for one in SUBSTITUTABLE if singles[one] is Outcome.UNRESOLVED]
     if not enough:
         if all_ideal is Outcome.UNRESOLVED:
             return answer(Verdict.UNRESOLVED, None, "the run with all components ideal could not be told")
+        if doubtful:
+            reason = f"runs with ideal {', '.join(doubtful)} could not be told, and no other substitution prevents it"
+            return answer(Verdict.UNRESOLVED, None, reason)
         reason = "no single substitution prevents it, all together do: more than one component takes part"
         return answer(Verdict.UNRESOLVED, None, reason)
-    doubtful = [one for one in SUBSTITUTABLE if singles[one] is Outcome.UNRESOLVED]
     if doubtful and SUBSTITUTABLE.index(doubtful[0]) < SUBSTITUTABLE.index(enough[0]):
         reason = f"the run with ideal {doubtful[0]} could not be told, and it lies upstream of {enough[0]}"
         return answer(Verdict.UNRESOLVED, None, reason)

@@ -21,6 +21,8 @@ from dvca_sumo.violations import Answer, Violation
 
 _QUOTED_LINES = 3  # of a failed run's standard error
 
+_Run = tuple[tuple[Component, ...], Selection]
+
 
 class Question(msgspec.Struct, frozen=True):
     """Are the messages of `ideal` from `since` on (None: all of them), being ideal, enough for a safe run?"""
@@ -53,7 +55,7 @@ class Setting(msgspec.Struct, frozen=True):
     scenario: Scenario
     faults: tuple[Fault, ...]
     futures: Futures  # of the factual run, continued past the violation
-    until: float  # [s] a probe without a violation up to here is safe; inf: to the end of the scenario
+    stop: StopRule  # a probe without a violation up to there is safe
     start: float  # [s] the ego's departure
     is_mission: bool  # the factual violation is one that only a finished drive can answer
     jitters: tuple[int | None, ...]  # one run of each question for each; (None,) in exact mode
@@ -66,7 +68,7 @@ class Dtest:
         self._engine = engine
         self._setting = setting
         self._on_probe = on_probe
-        self._answers: dict[Question, Outcome] = {}
+        self._answers: dict[_Run, Outcome] = {}
         self.probes: list[Probe] = []
 
     @property
@@ -83,7 +85,10 @@ class Dtest:
 
         Probe ids follow the order of the questions, not of their finishing.
         """
-        new = [question for question in dict.fromkeys(questions) if question not in self._answers]
+        asked: dict[_Run, Question] = {}
+        for question in questions:
+            asked.setdefault(self._run(question), question)
+        new = [question for run, question in asked.items() if run not in self._answers]
         runs = [(question, jitter) for question in new for jitter in self._setting.jitters]
         first = len(self.probes)
 
@@ -97,31 +102,37 @@ class Dtest:
         probes = [made(row, answer) for row, answer in enumerate(answers)]
         self.probes += probes
         for question in new:
-            self._answers[question] = majority([one.outcome for one in probes if one.question == question])
-        return [self._answers[question] for question in questions]
+            outcomes = [one.outcome for one in probes if one.question == question]
+            self._answers[self._run(question)] = majority(outcomes)
+        return [self._answers[self._run(question)] for question in questions]
 
     def known(self, component: Component) -> dict[int, Outcome]:
         """What is known already of substituting `component` alone, by the index of the first message."""
+        questions = (probe.question for probe in self.probes if probe.question.ideal == (component,))
         return {
-            0 if question.since is None else question.since.index: outcome
-            for question, outcome in self._answers.items()
-            if question.ideal == (component,)
+            0 if question.since is None else question.since.index: self._answers[self._run(question)]
+            for question in questions
         }
 
     def evidence(self, question: Question) -> Probe | None:
         """The first probe of a question, among those that agree with its answer; None when it was not asked."""
-        if question not in self._answers:
+        run = self._run(question)
+        if run not in self._answers:
             return None
-        outcome = self._answers[question]
-        of_question = [probe for probe in self.probes if probe.question == question]
+        outcome = self._answers[run]
+        of_question = [probe for probe in self.probes if self._run(probe.question) == run]
         return next((probe for probe in of_question if probe.outcome is outcome), of_question[0])
+
+    def _run(self, question: Question) -> _Run:
+        """What is run for a question: asked in other words, it is the same one."""
+        return question.ideal, self._selection(question.since)
 
     def _task(self, question: Question, jitter: int | None) -> Task:
         ideals = [Ideal(component, self._selection(question.since)) for component in question.ideal]
         return Task(
             scenario=self._setting.scenario,
             interventions=(*self._setting.faults, *ideals),
-            stop=StopRule(after_violation=0.0, at=self._setting.until),
+            stop=self._setting.stop,
             futures=self._setting.futures,
             jitter=jitter,
         )

@@ -6,6 +6,7 @@ import msgspec
 
 from dvca_sumo.analysis.bisection import Bracket, Outcome, bisect
 from dvca_sumo.analysis.dtest import Dtest, Question
+from dvca_sumo.interventions import State
 from dvca_sumo.messages import Component, MessageId
 from dvca_sumo.record import MessageMark, Record
 
@@ -29,6 +30,7 @@ def violation_inducing_message(
     Starts from what is known of the component: SAFE when ideal from some message on, and VIOLATES from a
     later one on or, as the factual run shows, when not ideal at all. In exact mode the search ends on
     adjacent messages; else on adjacent states, of which the last message of the safe one is meant.
+    A substitution from a state on begins where that state is first met: there alone it can be asked for.
     Monotonicity is assumed inside the bracket, and checked against all that was asked, one state to
     either side of where the search ends included.
 
@@ -40,7 +42,8 @@ def violation_inducing_message(
         is_exact: Whether runs repeat bit for bit.
     """
     marks = _marks(record, component, time)
-    states = _first_of_states(marks)
+    begins = list(range(len(marks))) if is_exact else _first_visits(marks)
+    states = [row for row in _first_of_states(marks) if begins[row] == row]
 
     def question(index: int) -> Question:
         return Question((component,), marks[index] if index > 0 else None)
@@ -48,11 +51,14 @@ def violation_inducing_message(
     def test(index: int) -> Outcome:
         return dtest.ask(question(index))
 
-    bracket = bisect(test, _bracket(dtest.known(component), len(marks)), states)
+    def known() -> dict[int, Outcome]:
+        return {begins[index]: outcome for index, outcome in dtest.known(component).items()}
+
+    bracket = bisect(test, _bracket(known(), len(marks)), states)
     if is_exact:
         bracket = bisect(test, bracket)
-    _ask_around(test, states, bracket)
-    is_monotone = _is_monotone(dtest.known(component), bracket)
+    _ask_around(test, states, dtest.known(component), bracket)
+    is_monotone = _is_monotone(known(), bracket)
     low = bracket.low
     if not is_exact:
         state = marks[bracket.low].state
@@ -81,6 +87,12 @@ def _first_of_states(marks: list[MessageMark]) -> list[int]:
     return [row for row, mark in enumerate(marks) if row == 0 or mark.state != marks[row - 1].state]
 
 
+def _first_visits(marks: list[MessageMark]) -> list[int]:
+    """For each message, the index of the first one made in its state."""
+    first: dict[State, int] = {}
+    return [first.setdefault(mark.state, row) for row, mark in enumerate(marks)]
+
+
 def _bracket(known: dict[int, Outcome], count: int) -> Bracket:
     low = max(index for index, outcome in known.items() if outcome is Outcome.SAFE)
     later = [index for index, outcome in known.items() if outcome is Outcome.VIOLATES and index > low]
@@ -92,9 +104,10 @@ def _are_neighbours(states: list[int], bracket: Bracket, count: int) -> bool:
     return not between
 
 
-def _ask_around(test: Callable[[int], Outcome], states: list[int], bracket: Bracket) -> None:
-    before = [one for one in states if 0 < one < bracket.low]
-    after = [one for one in states if one > bracket.high]
+def _ask_around(test: Callable[[int], Outcome], states: list[int], known: dict[int, Outcome], bracket: Bracket) -> None:
+    """One state to either side, where nothing farther out was asked before."""
+    before = [one for one in states if 0 < one < bracket.low] if min(known) >= bracket.low else []
+    after = [one for one in states if one > bracket.high] if max(known) <= bracket.high else []
     for index in (*before[-1:], *after[:1]):
         test(index)
 

@@ -13,6 +13,7 @@ a driving one when the process that forked it ends.
 
 import gc
 import os
+import resource
 import signal
 import threading
 import time
@@ -31,7 +32,7 @@ from dvca_sumo.record import Record
 from dvca_sumo.run import RoadMapOf, Task, departed
 from dvca_sumo.stack.reference import StackFactory
 
-SPACING = 150  # world steps between the stem's checkpoints: what forking costs stays below a tenth of the run
+SPACING = 100  # world steps between the stem's checkpoints: what forking costs stays below a tenth of the run
 MEMORY_BUDGET = 1 << 30  # [bytes] of the stem's checkpoints together
 _KEPT_OF_AN_AGE = 2  # checkpoints for each doubling of the age
 
@@ -79,6 +80,7 @@ class Holder:
         self._is_stem = True
         self._wanted: frozenset[int] = frozenset()
         self._children: dict[int, int] = {}  # step -> process of the stem's checkpoints
+        self._killed: list[int] = []  # those it has dropped, until they are gone: their end takes a while
         self._deliver: Callable[[Record | Failure], None] = self._deliver_factual
         self._begin, self._since = 0.0, 0.0
         self._task: Task | None = None
@@ -116,9 +118,7 @@ class Holder:
             self._leave_checkpoint(step)
 
     def _leave_checkpoint(self, step: int) -> None:
-        if self._is_stem and step == 0:
-            gc.collect()
-            gc.freeze()  # the collector would touch, and so copy, every page of what is here already
+        gc.freeze()  # the collector would touch, and so copy, every page of what is here already
         child = self._forked(f"checkpoint-{step}")
         if child == 0:
             self._serve(step)
@@ -134,13 +134,17 @@ class Holder:
             counts[age] = counts.get(age, 0) + 1
             if step > 0 and counts[age] > _KEPT_OF_AN_AGE:
                 self._drop(step)
+        # What checkpoints hold alone is at most what was copied since the first: only past that is it worth measuring.
+        if resource.getrusage(resource.RUSAGE_SELF).ru_minflt * resource.getpagesize() < MEMORY_BUDGET:
+            return
         while len(self._children) > 2 and sum(map(private_memory, self._children.values())) > MEMORY_BUDGET:
             self._drop(sorted(self._children)[1])
 
     def _drop(self, step: int) -> None:
         process = self._children.pop(step)
         os.kill(process, signal.SIGKILL)
-        os.waitpid(process, 0)
+        self._killed.append(process)
+        self._killed = [one for one in self._killed if os.waitpid(one, os.WNOHANG)[0] == 0]
 
     def _serve(self, step: int) -> None:
         """Wait for orders. Returns in a branch or a pass only, which then drives on."""

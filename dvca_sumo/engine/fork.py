@@ -34,7 +34,7 @@ IS_AVAILABLE = sys.platform != "win32"
 
 _TICKS_PER_STEP = 10
 _WORTH_A_CHECKPOINT = 5  # world steps from the nearest one
-_BEFORE_VIOLATION = (1, 2, 4, 8, 16)  # [s] where the premise's branch leaves checkpoints
+_BEFORE_VIOLATION = (1, 2, 4)  # [s] where the premise's branch leaves checkpoints
 _BACKLOG = 64
 
 

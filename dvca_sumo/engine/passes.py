@@ -4,6 +4,7 @@ SUMO's drivers react to the ego, so their futures depend on the branch. A run wi
 repeated with the futures that its own previous pass recorded, until they agree.
 """
 
+import math
 import time
 from collections.abc import Callable, Sequence
 
@@ -19,7 +20,7 @@ from dvca_sumo.truth import Moment
 
 MOST_PASSES = 3
 TOLERANCE = 0.5  # [m] between a predicted and a real place
-_MATTERING = 30.0  # [m] from the ego
+_MATTERING = 30.0  # [m] from the ego, and not behind it: followers make way for it, not the reverse
 _COMPARED_EVERY = 5  # world steps
 
 
@@ -84,7 +85,9 @@ def divergence(futures: Futures, moments: Sequence[Moment]) -> float:
     worst = 0.0
     for moment in moments[::_COMPARED_EVERY]:
         ego, objects = moment.ego, moment.objects
-        near = np.hypot(objects.boxes[:, 0] - ego.x, objects.boxes[:, 1] - ego.y) < _MATTERING
+        dx, dy = objects.boxes[:, 0] - ego.x, objects.boxes[:, 1] - ego.y
+        is_ahead = dx * math.cos(ego.heading) + dy * math.sin(ego.heading) > 0.0
+        near = (np.hypot(dx, dy) < _MATTERING) & is_ahead
         for row in np.flatnonzero(near):
             track = futures.tracks.get(objects.ids[row])
             if track is not None and track.times[0] <= moment.time <= track.times[-1]:

@@ -106,7 +106,7 @@ def _work(job: Callable[[], object], sender: Connection, log: Path, parent: int)
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
-    # Python's own streams may have been exchanged (a notebook, a test runner); line by line, for a crash flushes nothing.
+    # Python's own streams may be others (a notebook's, a test runner's). By the line: a crash flushes nothing.
     sys.stdout = sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
     try:
         answer = job()

@@ -269,6 +269,8 @@ class Drive:
             return Ending.ARRIVED
         if moment.time >= self._latest - TICK or beyond > _LOST_BEYOND or self._is_stuck:
             return Ending.TIME_OVER
+        if moment.time >= rule.settled - TICK and self.ego.station() > rule.place:
+            return Ending.CUT
         stop = min(rule.at, self._breach + rule.after_violation, self._contact + rule.after_contact)
         return Ending.CUT if moment.time >= stop - TICK else None
 

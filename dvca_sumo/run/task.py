@@ -14,6 +14,8 @@ class StopRule(msgspec.Struct, frozen=True):
     after_violation: float = math.inf  # [s] past the first violation
     after_contact: float = 0.0  # [s] past the first contact: SUMO does not simulate what follows a crash
     at: float = math.inf  # [s] simulation time
+    settled: float = math.inf  # [s] simulation time from which an ego ...
+    place: float = math.inf  # [m] ... whose rear axle is beyond this station has left the danger behind
 
 
 class Task(msgspec.Struct, frozen=True):

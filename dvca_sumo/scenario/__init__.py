@@ -49,7 +49,7 @@ class Scenario(msgspec.Struct, frozen=True):
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """SUMO's command line, but for net and additional files (see `silenced`)."""
+        """SUMO's command line, but for its input files (see `silenced`)."""
         words = ["-c", str(self.configuration.path)]
         for override in self.overrides:
             words += [f"--{override.option}", override.used]

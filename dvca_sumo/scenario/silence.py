@@ -1,8 +1,8 @@
-"""Copies of net and additional files whose outputs go nowhere.
+"""Copies of net, additional and route files whose outputs go nowhere.
 
-Detectors and similar elements name their own output file, relative to the file they stand in. A run
-must not write into the user's folder, so files with such elements are copied with the output
-attribute pointed to the null device and every relative input path made absolute.
+Detectors, and devices of single vehicles, name their own output file, relative to the file they stand
+in. A run must not write into the user's folder, so files with such elements are copied with the output
+pointed to the null device and every relative input path made absolute.
 """
 
 import os
@@ -31,9 +31,12 @@ WRITTEN = {
 }
 # Element -> attribute with the path of a file that SUMO reads.
 _READ = {"variableSpeedSign": "file", "rerouter": "file", "include": "href", "poly": "imgFile", "poi": "imgFile"}
-_DETECTOR_FILE = "file"  # parameter of an actuated traffic light: where its own detectors write
+# Keys of parameters with the path of a file that SUMO writes.
+_LIGHT_FILE = "file"  # of an actuated traffic light: where its own detectors write
+_DEVICE_FILES = ("device.ssm.file", "device.toc.file")  # of vehicles and their types
 _SUSPICIOUS = re.compile(
-    r"<\s*(?:" + "|".join([*WRITTEN, "include"]) + r")\b|\bkey\s*=\s*[\"']" + _DETECTOR_FILE + r"[\"']"
+    r"<\s*(?:" + "|".join([*WRITTEN, "include"]) + r")\b"
+    r"|\bkey\s*=\s*[\"'](?:" + "|".join(map(re.escape, [_LIGHT_FILE, *_DEVICE_FILES])) + r")[\"']"
 )
 
 
@@ -55,13 +58,7 @@ def _silenced(path: Path, folder: Path) -> Path:
     except ET.ParseError as error:
         raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
     for number, element in enumerate(root.iter()):
-        written = WRITTEN.get(element.tag)
-        if written is not None and element.get(written):
-            element.set(written, os.devnull)
-        if element.tag == "tlLogic":
-            for parameter in element.iter("param"):
-                if parameter.get("key") == _DETECTOR_FILE:
-                    parameter.set("value", os.devnull)
+        _silence(element)
         read = _READ.get(element.tag)
         source = element.get(read) if read is not None else None
         if read is not None and source:
@@ -73,3 +70,15 @@ def _silenced(path: Path, folder: Path) -> Path:
     copy = folder / path.name.removesuffix(".gz")
     ET.ElementTree(root).write(copy, encoding="utf-8", xml_declaration=True)
     return copy
+
+
+def _silence(element: ET.Element) -> None:
+    written = WRITTEN.get(element.tag)
+    if written is not None and element.get(written):
+        element.set(written, os.devnull)
+    if element.tag == "param" and element.get("key") in _DEVICE_FILES:
+        element.set("value", os.devnull)
+    if element.tag == "tlLogic":
+        for parameter in element.iter("param"):
+            if parameter.get("key") == _LIGHT_FILE:
+                parameter.set("value", os.devnull)

@@ -79,8 +79,10 @@ class Session:
         types = folder / "ego.add.xml"
         types.write_text(f'<additional><vType id="{NEVER_TELEPORTED}" timeToTeleport="-1"/></additional>')
         read = scenario.configuration
-        net, *additionals = silenced((read.net, *read.additionals), folder)
-        files = ("-n", str(net), "-a", ",".join(map(str, (*additionals, types))))
+        net, *others = map(str, silenced((read.net, *read.additionals, *read.routes), folder))
+        additionals, routes = others[: len(read.additionals)], others[len(read.additionals) :]
+        files = ["-n", net, "-a", ",".join((*additionals, str(types)))]
+        files += ["-r", ",".join(routes)] if routes else []
         try:
             libsumo.start(["sumo", *scenario.arguments, *files])
         except _GIVES_UP as error:

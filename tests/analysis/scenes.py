@@ -174,7 +174,7 @@ def ideals(task: Task) -> dict[Component, Ideal]:
 
 
 def asking(engine: FakeEngine, *, jitters: tuple[int | None, ...] = (None,), is_mission: bool = False) -> Dtest:
-    setting = Setting(SCENARIO, (), Futures(), START + 12.0, is_mission, jitters)
+    setting = Setting(SCENARIO, (), Futures(), START + 12.0, START, is_mission, jitters)
     heard: list[Probe] = []
     return Dtest(engine, setting, heard.append)
 
@@ -182,7 +182,7 @@ def asking(engine: FakeEngine, *, jitters: tuple[int | None, ...] = (None,), is_
 def first_substituted(record: Record, ideal: Ideal) -> int:
     """Index of the message of this drive at which a substitution begins; one past the last when it never does."""
     if ideal.selection.from_state is None:
-        return ideal.selection.first
+        return record.first_at(ideal.component, START + ideal.selection.start)
     gate = Gate(ideal.selection)
     made = record.executions[ideal.component]
     for index in range(len(made)):

@@ -4,9 +4,17 @@ from itertools import product
 
 import pytest
 
-from analysis.scenes import CRASHED, SAFE, VIOLATING, FakeEngine, asking, ideals
+from analysis.scenes import CRASHED, SAFE, START, VIOLATING, Answers, FakeEngine, asking, drive, ideals
 from dvca_sumo.analysis.bisection import Outcome
-from dvca_sumo.analysis.components import SUBSTITUTABLE, ComponentAnswer, Verdict, responsible_component
+from dvca_sumo.analysis.components import (
+    SUBSTITUTABLE,
+    UPSTREAM,
+    ComponentAnswer,
+    Verdict,
+    lookbacks,
+    responsible_component,
+)
+from dvca_sumo.analysis.dtest import Question
 from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.messages import Component
@@ -16,8 +24,19 @@ S, V, U = Outcome.SAFE, Outcome.VIOLATES, Outcome.UNRESOLVED
 GLIMPSES: dict[Outcome, Glimpse | Failure] = {S: SAFE, V: VIOLATING, U: CRASHED}
 Vector = tuple[Outcome, Outcome, Outcome, Outcome]
 
+DRIVE = drive(duration=40.0)
+VIOLATED = START + 39.0
+
+
+def asked_of(answers: Answers) -> tuple[ComponentAnswer, list[Question]]:
+    dtest = asking(FakeEngine(answers))
+    found = responsible_component(dtest, DRIVE, VIOLATED)
+    return found, [probe.question for probe in dtest.probes]
+
 
 def answer(all_ideal: Outcome, singles: Vector) -> ComponentAnswer:
+    """In a world where it does not matter from when on a component is ideal."""
+
     def answers(task: Task) -> Glimpse | Failure:
         substituted = tuple(ideals(task))
         if len(substituted) == len(SUBSTITUTABLE):
@@ -25,10 +44,19 @@ def answer(all_ideal: Outcome, singles: Vector) -> ComponentAnswer:
         (component,) = substituted
         return GLIMPSES[singles[SUBSTITUTABLE.index(component)]]
 
-    engine = FakeEngine(answers)
-    found = responsible_component(asking(engine))
-    assert len(engine.tasks) == 5
-    return found
+    return asked_of(answers)[0]
+
+
+def enough_before(**backs: float) -> Answers:
+    """A world where a component (or `together`) must be ideal so many seconds before the violation, or earlier."""
+
+    def answers(task: Task) -> Glimpse:
+        substituted = ideals(task)
+        name = "together" if len(substituted) > 1 else next(iter(substituted)).value
+        since = next(iter(substituted.values())).selection.start
+        return SAFE if name in backs and VIOLATED - START - since > backs[name] else VIOLATING
+
+    return answers
 
 
 def test_a_violation_that_stays_with_all_components_ideal_is_plannings() -> None:
@@ -101,3 +129,65 @@ def test_every_vector_of_answers_obeys_the_table() -> None:
         assert found.all_ideal is all_ideal
         assert tuple(found.singles.values()) == vector
         assert found.reason
+
+
+@pytest.mark.parametrize(
+    ("duration", "expected"),
+    [(0.5, [None]), (1.0, [None]), (1.5, [1.0, None]), (39.0, [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, None])],
+)
+def test_looking_back_doubles_until_the_departure_and_ends_with_the_whole_drive(
+    duration: float, expected: list[float | None]
+) -> None:
+    assert lookbacks(START, START + duration) == expected
+
+
+def backs(questions: list[Question], *ideal: Component) -> list[float | None]:
+    """How long before the violation a substitution was asked for."""
+    marks = [question.since for question in questions if question.ideal == ideal]
+    return [None if mark is None else round(VIOLATED - mark.time, 2) for mark in marks]
+
+
+def test_the_search_begins_just_before_the_violation_and_stops_where_it_is_prevented() -> None:
+    found, questions = asked_of(enough_before(together=2.5, control=2.5))
+    assert found.component is Component.CONTROL
+    assert backs(questions, *SUBSTITUTABLE) == [1.0, 2.0, 4.0]
+    assert backs(questions, Component.CONTROL) == [4.0]
+
+
+def test_a_component_is_asked_no_later_than_where_all_together_are_enough() -> None:
+    found, questions = asked_of(enough_before(together=1.5, perception=7.0))
+    assert found.component is Component.PERCEPTION
+    assert backs(questions, Component.PERCEPTION) == [2.0, 4.0, 8.0]
+
+
+def test_upstream_components_are_asked_a_while_further_back_than_the_one_that_is_enough() -> None:
+    found, questions = asked_of(enough_before(together=1.5, localization=7.0, prediction=1.5))
+    assert (found.component, found.alternatives) == (Component.LOCALIZATION, (Component.PREDICTION,))
+    assert backs(questions, Component.PERCEPTION) == [2.0, 4.0, 8.0]
+    assert backs(questions, Component.PREDICTION) == [2.0]
+
+    found, questions = asked_of(enough_before(together=1.5, localization=2.0 * UPSTREAM + 1.0, prediction=1.5))
+    assert found.component is Component.PREDICTION
+    assert backs(questions, Component.LOCALIZATION) == [2.0, 4.0, 2.0 * UPSTREAM]
+
+
+def test_a_component_that_must_be_ideal_from_the_start_is_found() -> None:
+    found, questions = asked_of(enough_before(together=38.0, localization=38.0))
+    assert found.component is Component.LOCALIZATION
+    assert backs(questions, Component.LOCALIZATION) == [None]
+
+
+def test_planning_is_named_only_when_all_ideal_from_the_start_changes_nothing() -> None:
+    found, questions = asked_of(enough_before())
+    assert found.component is Component.PLANNING
+    assert backs(questions, *SUBSTITUTABLE)[-1] is None
+    assert set(found.singles) == set(SUBSTITUTABLE)
+
+
+def test_a_component_costs_a_few_questions_for_each_doubling_of_time() -> None:
+    for back in (0.5, 1.5, 3.0, 6.0, 12.0, 24.0, 38.0):
+        for component in SUBSTITUTABLE:
+            found, questions = asked_of(enough_before(together=back, **{component.value: back}))
+            assert found.component is component
+            levels = len(backs(questions, *SUBSTITUTABLE))
+            assert len(questions) <= levels + len(SUBSTITUTABLE) * UPSTREAM.bit_length()

@@ -14,6 +14,7 @@ from analysis.scenes import (
     breach,
     collision,
     drive,
+    first_substituted,
     glimpse,
     ideals,
     unknown,
@@ -28,7 +29,8 @@ from dvca_sumo.run import StopRule, Task
 from dvca_sumo.violations import Category
 
 LOCALIZATION, PERCEPTION, CONTROL = Component.LOCALIZATION, Component.PERCEPTION, Component.CONTROL
-MARK = drive(duration=2.0).mark(MessageId(PERCEPTION, 12))
+DRIVE = drive(duration=2.0)
+MARK = DRIVE.mark(MessageId(PERCEPTION, 12))
 
 
 def only(component: Component) -> Answers:
@@ -63,10 +65,31 @@ def test_the_same_component_from_another_message_on_is_another_question() -> Non
     assert len(engine.tasks) == 2
 
 
+def test_with_jitter_two_messages_of_one_state_are_the_same_question() -> None:
+    first, second = (DRIVE.mark(MessageId(PERCEPTION, index)) for index in (12, 13))
+    assert first.state == second.state
+    exact, jittered = FakeEngine(only(PERCEPTION)), FakeEngine(only(PERCEPTION))
+    for engine, jitters in ((exact, (None,)), (jittered, (0,))):
+        dtest = asking(engine, jitters=jitters)
+        dtest.ask_all([Question((PERCEPTION,), first), Question((PERCEPTION,), second)])
+        dtest.ask(Question((PERCEPTION,), second))
+        assert dtest.evidence(Question((PERCEPTION,), second)) is dtest.probes[-1]
+    assert (len(exact.tasks), len(jittered.tasks)) == (2, 1)
+
+
+def test_what_is_known_of_a_component_alone_is_known_by_message() -> None:
+    dtest = asking(FakeEngine(only(PERCEPTION)))
+    dtest.ask_all([Question((PERCEPTION,)), Question((PERCEPTION,), MARK), Question((LOCALIZATION,), MARK)])
+    dtest.ask(Question((LOCALIZATION, CONTROL)))
+    assert dtest.known(PERCEPTION) == {0: Outcome.SAFE, 12: Outcome.SAFE}
+    assert dtest.known(LOCALIZATION) == {12: Outcome.VIOLATES}
+    assert dtest.known(CONTROL) == {}
+
+
 def test_probe_ids_follow_the_order_of_the_questions_not_of_their_finishing() -> None:
     heard: list[Probe] = []
     engine = FakeEngine(only(PERCEPTION))
-    dtest = Dtest(engine, Setting(SCENARIO, (), Futures(), 20.0, False, (None,)), heard.append)
+    dtest = Dtest(engine, Setting(SCENARIO, (), Futures(), 20.0, START, False, (None,)), heard.append)
     questions = [Question((component,)) for component in (LOCALIZATION, PERCEPTION, CONTROL)]
     dtest.ask(questions[0])
     dtest.ask_all(questions)
@@ -78,7 +101,7 @@ def test_probe_ids_follow_the_order_of_the_questions_not_of_their_finishing() ->
 
 def test_a_run_is_the_faults_then_the_substitutes_stopped_at_the_first_violation_or_when_settled() -> None:
     engine, fault = FakeEngine(only(PERCEPTION)), planted_fault("perception.miss")
-    dtest = Dtest(engine, Setting(SCENARIO, (fault,), Futures(), 20.0, False, (None,)), lambda _: None)
+    dtest = Dtest(engine, Setting(SCENARIO, (fault,), Futures(), 20.0, START, False, (None,)), lambda _: None)
     dtest.ask(Question((LOCALIZATION, PERCEPTION), MARK))
     (task,) = engine.tasks
     assert task.interventions[0] == fault
@@ -87,11 +110,13 @@ def test_a_run_is_the_faults_then_the_substitutes_stopped_at_the_first_violation
     assert task.jitter is None
 
 
-def test_exact_runs_substitute_from_an_index_jittered_ones_from_a_state() -> None:
+def test_exact_runs_substitute_from_the_very_message_jittered_ones_from_its_state() -> None:
     exact, jittered = FakeEngine(only(PERCEPTION)), FakeEngine(only(PERCEPTION))
-    asking(exact).ask(Question((PERCEPTION,), MARK))
+    asking(exact).ask(Question((LOCALIZATION, PERCEPTION), MARK))
     asking(jittered, jitters=(0, 1, 2)).ask(Question((PERCEPTION,), MARK))
-    assert ideals(exact.tasks[0])[PERCEPTION].selection == Selection(first=12)
+    substituted = ideals(exact.tasks[0])
+    assert first_substituted(DRIVE, substituted[PERCEPTION]) == 12
+    assert first_substituted(DRIVE, substituted[LOCALIZATION]) == 120
     assert [ideals(task)[PERCEPTION].selection for task in jittered.tasks] == [Selection(from_state=MARK.state)] * 3
     assert [task.jitter for task in jittered.tasks] == [0, 1, 2]
 

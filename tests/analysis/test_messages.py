@@ -89,18 +89,31 @@ def test_marks_say_when_and_in_which_state_a_message_was_made() -> None:
 def test_four_thousand_messages_cost_at_most_sixteen_probes(last: int) -> None:
     crash = collision(START + 40.0)
     engine = FakeEngine(needing(LONG_DRIVE, CONTROL, last, crash))
-    answer = violation_inducing_message(asking(engine), LONG_DRIVE, CONTROL, crash.time, is_exact=True)
+    dtest = asking(engine)
+    dtest.ask(Question((CONTROL,)))
+    answer = violation_inducing_message(dtest, LONG_DRIVE, CONTROL, crash.time, is_exact=True)
     assert len(LONG_DRIVE.executions[CONTROL]) == 4000
     assert answer.last_safe.index == last
-    assert len(engine.tasks) <= 16
+    assert len(engine.tasks) <= 1 + 16
+
+
+def test_what_is_known_already_is_where_the_search_begins() -> None:
+    engine = FakeEngine(needing(DRIVE, PERCEPTION, 33, CRASH))
+    dtest = asking(engine)
+    dtest.ask_all([Question((PERCEPTION,), DRIVE.mark(MessageId(PERCEPTION, index))) for index in (20, 30, 35, 40)])
+    answer = violation_inducing_message(dtest, DRIVE, PERCEPTION, CRASH.time, is_exact=True)
+    assert answer.last_safe.index == 33
+    assert len(engine.tasks) <= 4 + math.ceil(math.log2(5)) + 2
 
 
 def test_a_long_standstill_is_one_state_and_costs_its_own_logarithm_only() -> None:
     record = replace(LONG_DRIVE, stations=[min(station, 60.0) for station in LONG_DRIVE.stations])
     engine = FakeEngine(needing(record, CONTROL, 3000, CRASH))
-    violation_inducing_message(asking(engine), record, CONTROL, START + 40.0, is_exact=True)
+    dtest = asking(engine)
+    dtest.ask(Question((CONTROL,)))
+    violation_inducing_message(dtest, record, CONTROL, START + 40.0, is_exact=True)
     states, longest = 21, 3600
-    assert len(engine.tasks) <= math.ceil(math.log2(states)) + math.ceil(math.log2(longest)) + 2
+    assert len(engine.tasks) <= 1 + math.ceil(math.log2(states)) + math.ceil(math.log2(longest)) + 2
 
 
 def test_messages_that_cannot_be_told_leave_a_gap_that_is_noted() -> None:
@@ -115,11 +128,11 @@ def test_messages_that_cannot_be_told_leave_a_gap_that_is_noted() -> None:
 
 
 @pytest.mark.parametrize("odd", [range(26, 28), range(32, 34)])
-def test_an_outcome_that_is_not_monotone_nearby_is_noticed_and_the_ends_stay_proven(odd: range) -> None:
-    def answer_at(index: int) -> Glimpse:
-        return VIOLATING if (index >= 30) != (index in odd) else SAFE
-
-    answer, dtest = found(DRIVE, PERCEPTION, by_index(DRIVE, answer_at))
+def test_an_outcome_that_is_not_monotone_where_it_was_asked_is_noticed_and_the_ends_stay_proven(odd: range) -> None:
+    answers = by_index(DRIVE, lambda index: VIOLATING if (index >= 30) != (index in odd) else SAFE)
+    dtest = asking(FakeEngine(answers))
+    dtest.ask_all([Question((PERCEPTION,), DRIVE.mark(MessageId(PERCEPTION, index))) for index in (0, 26, 28, 31, 33)])
+    answer = violation_inducing_message(dtest, DRIVE, PERCEPTION, CRASH.time, is_exact=True)
     assert not answer.is_monotone
     assert "not monotone" in answer.note
     assert ends(dtest, answer) == [Outcome.SAFE, Outcome.VIOLATES]

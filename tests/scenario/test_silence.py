@@ -107,3 +107,10 @@ def test_files_of_one_name_in_different_folders_do_not_meet(tmp_path: Path, scra
 def test_a_malformed_file_is_named(tmp_path: Path, scratch: Path) -> None:
     with pytest.raises(ScenarioError, match=r"a\.add\.xml is not well-formed XML"):
         silenced((written(tmp_path, '<e1Detector file="x">'),), scratch)
+
+
+def test_devices_of_vehicles_and_types_write_nowhere(tmp_path: Path, scratch: Path) -> None:
+    names = ("device.ssm.file", "device.toc.file", "device.ssm.measures")
+    words = "".join(f'<param key="{name}" value="x"/>' for name in names)
+    root = copied(written(tmp_path, f'<vType id="t">{words}</vType><vehicle id="v">{words}</vehicle>'), scratch)
+    assert [one.get("value") for one in root.iter("param")] == [os.devnull, os.devnull, "x"] * 2

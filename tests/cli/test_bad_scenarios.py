@@ -1,0 +1,112 @@
+"""A scenario that cannot be run: one line that says what to mend, exit code 3, nothing written."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from command_line import assert_one_error, contents, typed
+from small_scenarios import EGO
+
+from dvca_sumo.cli import ExitCode
+
+Spoil = Callable[[Path], None]  # of the scenario's folder
+
+MARKED = '<vehicle id="{0}" depart="0"><route edges="bc"/><param key="dvca.ego" value="true"/></vehicle>'
+
+
+def _removed(name: str) -> Spoil:
+    return lambda folder: (folder / name).unlink()
+
+
+def _truncated(name: str) -> Spoil:
+    def cut(folder: Path) -> None:
+        text = (folder / name).read_text(encoding="utf-8")
+        (folder / name).write_text(text[: len(text) * 2 // 3], encoding="utf-8")
+
+    return cut
+
+
+def _replaced(name: str, text: str) -> Spoil:
+    return lambda folder: (folder / name).write_text(text, encoding="utf-8") and None
+
+
+class Broken(NamedTuple):
+    """A scenario with one defect, and what must be said of it."""
+
+    says: tuple[str, ...]
+    spoil: Spoil = contents  # type: ignore[assignment]  # only looks
+    routes: str = EGO
+    additional: str = ""
+    options: tuple[tuple[str, str], ...] = ()
+    words: tuple[str, ...] = ()
+
+
+BROKEN = {
+    "no sumocfg, one of a similar name": Broken(
+        ("no such SUMO configuration", "did you mean runs.sumocfg?"),
+        lambda folder: (folder / "run.sumocfg").rename(folder / "runs.sumocfg") and None,
+    ),
+    "sumocfg cut off": Broken(("run.sumocfg is not well-formed XML", "line 1"), _truncated("run.sumocfg")),
+    "sumocfg empty": Broken(("run.sumocfg is not well-formed XML",), _replaced("run.sumocfg", "")),
+    "sumocfg without a net": Broken(("option net-file is not set",), _replaced("run.sumocfg", "<configuration/>")),
+    "option misspelt": Broken(("No option with the name 'rout-files' exists",), options=(("rout_files", "x"),)),
+    "option ill-typed": Broken(("option step-length is no time: 'abc'", "allowed"), options=(("step_length", "abc"),)),
+    "option ill-typed that only SUMO reads": Broken(("abc",), options=(("time_to_teleport", "abc"),)),
+    "mesoscopic model": Broken(("mesosim",), options=(("mesosim", "true"),)),
+    "end before begin": Broken(("ends at 10 s", "begin at 20 s"), words=("--begin", "20", "--end", "10")),
+    "no net": Broken(("net-file", "net.net.xml", "does not exist"), _removed("net.net.xml")),
+    "net cut off": Broken(("not a SUMO net", "net.net.xml"), _truncated("net.net.xml")),
+    "net that is none": Broken(("not a SUMO net", "net.net.xml"), _replaced("net.net.xml", "<routes/>")),
+    "no route file": Broken(("route-files", "routes.rou.xml", "does not exist"), _removed("routes.rou.xml")),
+    "route file cut off": Broken(("routes.rou.xml", "At line/column"), _truncated("routes.rou.xml")),
+    "route over an unknown edge": Broken(("'zz'", "not known"), routes=EGO.replace('to="bc"', 'to="zz"')),
+    "route with a gap": Broken(
+        ("'ego' has no valid route",), routes='<vehicle id="ego" depart="0"><route edges="ab nb"/></vehicle>'
+    ),
+    "departure ill-typed": Broken(("Invalid departure time",), routes=EGO.replace('depart="0"', 'depart="soon"')),
+    "additional file cut off": Broken(("extra.add.xml is not",), additional='<inductionLoop id="d" file="o.xml">'),
+    "detector on an unknown lane": Broken(
+        ("'zz_0' is not known",), additional='<inductionLoop id="d" lane="zz_0" pos="3" period="9" file="o.xml"/>'
+    ),
+    "no ego": Broken(("names no ego", "--ego auto", "candidates: car"), routes=EGO.replace('"ego"', '"car"')),
+    "no vehicle at all": Broken(("names no ego", "has no vehicles"), routes=""),
+    "unknown ego": Broken(("no vehicle 'eggo'", "did you mean ego?"), words=("--ego", "eggo")),
+    "two egos": Broken(("several vehicles are marked", "a, b"), routes=MARKED.format("a") + MARKED.format("b")),
+    "nobody fit to be the ego": Broken(("no vehicle fit to be the ego",), words=("--ego", "auto")),
+    "ego that departs after the end": Broken(
+        ("'ego' never departs between 0 s and 20 s",),
+        routes=EGO.replace('depart="0"', 'depart="50"'),
+        words=("--end", "20"),
+    ),
+    "ego that finds no room to depart": Broken(
+        ("'ego' never departs",),
+        routes='<vehicle id="broken_down" depart="0" departPos="20"><route edges="bc"/>'
+        '<stop lane="bc_0" endPos="20" duration="90"/></vehicle>'
+        + EGO.replace("<trip", '<trip departLane="0"').replace('departPos="20"', 'departPos="18"'),
+        words=("--end", "9"),
+    ),
+    "ego that SUMO removes": Broken(
+        ("SUMO removed the ego 'ego' at ",),
+        routes=EGO.replace('from="bc"', 'from="ab"'),
+        additional='<vaporizer id="bc" begin="0" end="900"/>',
+    ),
+    "threshold ill-typed": Broken(
+        ("dvca.ttc", "'ego'", "'soon'", "allowed"),
+        routes=EGO.replace("/>", '><param key="dvca.ttc" value="soon"/></trip>'),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN.values(), ids=BROKEN)
+def test_it_is_told_in_one_line(case: Broken, scenario: Callable[..., Path]) -> None:
+    config = scenario(case.routes, case.additional, **dict(case.options))
+    case.spoil(config.parent)
+    before = contents(config.parent)
+    said = typed("run", config, *case.words)
+    assert_one_error(said, ExitCode.BAD_INPUT, *case.says)
+    assert contents(config.parent) == before
+
+
+def test_a_folder_is_no_scenario(tmp_path: Path) -> None:
+    assert_one_error(typed("run", tmp_path), ExitCode.BAD_INPUT, "is a folder")

@@ -1,0 +1,77 @@
+"""A user's stack that cannot be built or fails: named, in one line, with the contract's exit code."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from command_line import assert_one_error, typed
+
+from dvca_sumo.cli import ExitCode
+
+STACKS = Path(__file__).with_name("users_stacks.py")
+
+BAD_FACTORIES = {
+    "nowhere:stack": ("'nowhere:stack' cannot be imported", "No module named 'nowhere'"),
+    "users_stacks:nothing": ("'users_stacks:nothing' cannot be imported", "no attribute 'nothing'"),
+    "half_written:stack": ("'half_written:stack' cannot be imported", "SyntaxError"),
+    "users_stacks": ("no stack 'users_stacks'", "MODULE:FACTORY", "FILE.toml"),
+    "users_stacks:NOT_CALLABLE": ("'users_stacks:NOT_CALLABLE' is not callable",),
+    "users_stacks:raising": ("'users_stacks:raising' raised LookupError", "no weights for seed 5"),
+    "users_stacks:of_another_type": ("'users_stacks:of_another_type' returned dict, not a Stack",),
+    "users_stacks:fails_in_cycle_57": ("planning raised ArithmeticError: no convergence in cycle 57",),
+    "users_stacks:not_a_number": ("control", "must be finite", "nan"),
+}
+BAD_FILES = {
+    "unknown field": ("[planning]\nbravery = 2\n", ("bravery", "$.planning")),
+    "unknown component": ("[brain]\nsize = 2\n", ("brain",)),
+    "wrong type": ('[planning]\nacceleration = "fast"\n', ("`str`", "$.planning.acceleration")),
+    "no TOML": ("planning: fast\n", ("line 1",)),
+}
+
+
+@pytest.mark.parametrize("stack", BAD_FACTORIES)
+def test_a_factory_that_does_not_work(stack: str, tmp_path: Path) -> None:
+    shutil.copy(STACKS, tmp_path)
+    (tmp_path / "half_written.py").write_text("def stack(", encoding="utf-8")
+    said = typed("run", "nets/cs1.sumocfg", "--seed", "5", "--stack", stack, folder=tmp_path)
+    assert_one_error(said, ExitCode.BAD_INPUT, *BAD_FACTORIES[stack])
+
+
+@pytest.mark.parametrize("case", BAD_FILES)
+def test_a_parameter_file_that_does_not_fit(case: str, tmp_path: Path) -> None:
+    text, says = BAD_FILES[case]
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    said = typed("run", "nets/cs1.sumocfg", "--stack", "mine.toml", folder=tmp_path)
+    assert_one_error(said, ExitCode.BAD_INPUT, "mine.toml", *says)
+
+
+def test_a_parameter_file_that_is_not_there(tmp_path: Path) -> None:
+    said = typed("run", "nets/cs1.sumocfg", "--stack", "mine.toml", folder=tmp_path)
+    assert_one_error(said, ExitCode.BAD_INPUT, "mine.toml", "cannot be read", "No such file")
+
+
+def test_a_parameter_file_that_fits_is_used(tmp_path: Path, scenario: Callable[..., Path]) -> None:
+    (tmp_path / "slow.toml").write_text("[planning]\nacceleration = 0.5\n", encoding="utf-8")
+    config = scenario()
+    plain = typed("run", config, "--json").result
+    slow = typed("run", config, "--json", "--stack", tmp_path / "slow.toml").result
+    assert plain["verdict"] == slow["verdict"] == "none"
+    assert plain["digest"] != slow["digest"]
+
+
+def test_a_stack_that_crashes_its_process_is_an_internal_error_not_a_dead_tool(tmp_path: Path) -> None:
+    shutil.copy(STACKS, tmp_path)
+    said = typed("run", "nets/cs1.sumocfg", "--stack", "users_stacks:crashing", folder=tmp_path)
+    assert_one_error(said, ExitCode.INTERNAL, "the run failed: the process died")
+
+
+def test_a_stack_that_never_drives_alike_is_not_reproducible(tmp_path: Path, scenario: Callable[..., Path]) -> None:
+    shutil.copy(STACKS, tmp_path)
+    words = ("--stack", "users_stacks:never_the_same", "--json")
+    said = typed("run", scenario(), *words, folder=tmp_path)
+    assert said.code == ExitCode.UNRESOLVED, said
+    assert said.result["verdict"] == "not_reproducible"
+    assert said.result["reproducible"] is False
+    assert said.result["component"] is None
+    assert "differs" in said.result["reason"]
