@@ -77,13 +77,16 @@ def run(
         raise
 
 
-def attribute(drive: FactualDrive, progress: Progress | None = None) -> Attribution:
+def attribute(drive: FactualDrive, progress: Progress | None = None, *, certify: bool = False) -> Attribution:
     """Explain the violation of a drive, if there is one.
+
+    With `certify` the conclusion is asked once more of the replay engine, from time 0.
 
     Raises:
         AttributionStoppedError: The user interrupted it; what was found is in its `partial`.
     """
     try:
-        return explain(drive.engine, drive.request, drive.record, progress or Progress())
+        witness = drive.engine.witness if certify else None
+        return explain(drive.engine, drive.request, drive.record, progress or Progress(), witness)
     finally:
         drive.engine.close()

@@ -83,6 +83,7 @@ def program() -> None:
 @click.option("--jobs", type=click.IntRange(1), default=CPUS, show_default=True, help="Runs at once.")
 @click.option("--jitter", is_flag=True, help="Draw schedule and sensor noise anew for each run; majority of repeats.")
 @click.option("--repeats", type=click.IntRange(1), help=f"Runs of each question in jitter mode [default: {_REPEATS}]")
+@click.option("--certify", is_flag=True, help="Ask the conclusion once more of the replay engine, from time 0.")
 @click.option("--begin", type=float, metavar="T", help="Start of the simulation [s].")
 @click.option("--end", type=float, metavar="T", help="Latest end of the simulation [s].")
 @click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Folder for result.json.")
@@ -97,6 +98,7 @@ def run(
     jobs: int,
     jitter: bool,  # noqa: FBT001
     repeats: int | None,
+    certify: bool,  # noqa: FBT001
     begin: float | None,
     end: float | None,
     output: Path | None,
@@ -118,7 +120,7 @@ def run(
     drive = api.run(scenario, faults, stack, (repeats or _REPEATS) if jitter else None, jobs, engine)
     terminal.factual(drive.record)
     try:
-        found = api.attribute(drive, terminal)
+        found = api.attribute(drive, terminal, certify=certify)
     except AttributionStoppedError as stopped:
         _publish(drive, stopped.partial, terminal.timing(), output, as_json=as_json)
         raise KeyboardInterrupt from None

@@ -7,7 +7,14 @@ import msgspec
 from msgspec.structs import replace
 
 from dvca_sumo.analysis.bisection import Outcome
-from dvca_sumo.analysis.components import ComponentAnswer, Verdict, first_questions, responsible_component
+from dvca_sumo.analysis.certificate import Check, certified
+from dvca_sumo.analysis.components import (
+    SUBSTITUTABLE,
+    ComponentAnswer,
+    Verdict,
+    first_questions,
+    responsible_component,
+)
 from dvca_sumo.analysis.differences import Difference, differences
 from dvca_sumo.analysis.dtest import Dtest, Probe, Question, Setting
 from dvca_sumo.analysis.messages import MessageAnswer, violation_inducing_message
@@ -65,6 +72,7 @@ class Attribution(msgspec.Struct, frozen=True):
     probes: tuple[Probe, ...] = ()
     evidence: tuple[Probe, ...] = ()  # the two adjacent probes
     planted: Planted | None = None
+    certificate: tuple[Check, ...] = ()  # empty: not asked for
 
 
 class AttributionStoppedError(Exception):
@@ -95,10 +103,13 @@ def factual_run(engine: Engine, request: Request) -> Record:
     return engine.record(_factual_task(request))
 
 
-def explain(engine: Engine, request: Request, record: Record, progress: Progress) -> Attribution:
+def explain(
+    engine: Engine, request: Request, record: Record, progress: Progress, witness: Engine | None = None
+) -> Attribution:
     """Explain the violation of a factual run, if there is one.
 
-    A run without a violation of which an oracle could not tell is UNRESOLVED, not clean.
+    A run without a violation of which an oracle could not tell is UNRESOLVED, not clean. With a
+    `witness` the conclusion is asked of that engine too; where it disagrees, nothing is concluded.
 
     Raises:
         AttributionStoppedError: The user interrupted it.
@@ -124,6 +135,8 @@ def explain(engine: Engine, request: Request, record: Record, progress: Progress
     try:
         for answer in _steps(found, engine, dtest, request):
             found = answer
+        if witness is not None:
+            found = _certified(found, Dtest(witness, setting, progress.probe))
     except KeyboardInterrupt:
         partial = replace(found, probes=tuple(dtest.probes), reason="interrupted")
         raise AttributionStoppedError(partial) from None
@@ -215,6 +228,19 @@ def _component_message(found: Attribution, dtest: Dtest, answer: ComponentAnswer
         differences=differences(record, MessageId(component, mark.index), dtest.futures, found.violation.object),
         evidence=tuple(probe for probe in map(dtest.evidence, messages.proof) if probe is not None),
     )
+
+
+def _certified(found: Attribution, witness: Dtest) -> Attribution:
+    if found.verdict is Verdict.COMPONENT and found.components is not None and found.components.component is not None:
+        certificate = certified(witness, found.evidence, (found.components.component,), Outcome.SAFE)
+    elif found.verdict is Verdict.PLANNING:
+        certificate = certified(witness, (), SUBSTITUTABLE, Outcome.VIOLATES)
+    else:
+        return found
+    if all(check.agrees for check in certificate):
+        return replace(found, certificate=certificate)
+    reason = f"the witness engine disagrees; without it: {found.reason}"
+    return replace(found, certificate=certificate, verdict=Verdict.UNRESOLVED, reason=reason)
 
 
 def _planted(faults: tuple[Fault, ...], found: Attribution) -> Planted | None:

@@ -58,8 +58,8 @@ class ForkEngine:
             StackError: The stack cannot be read or imported.
         """
         self.jobs = jobs
-        self.witness = ReplayEngine(net, stack, jobs, timeout)
-        self.roadmap = self.witness.roadmap
+        self._witness = ReplayEngine(net, stack, jobs, timeout)
+        self.roadmap = self._witness.roadmap
         self._net = net
         self._stack = stack
         self._timeout = timeout
@@ -68,10 +68,15 @@ class ForkEngine:
         self._checkpoints: list[_Checkpoint] = []
         self._grove: _Grove | None = None
 
+    @property
+    def witness(self) -> ReplayEngine:
+        """See `Engine`."""
+        return self._witness
+
     def record(self, task: Task) -> Record:
         """See `Engine`. The run's checkpoints stay until `close` or the next factual run."""
         if task.jitter is not None or self._factual is not None:
-            return self.witness.record(task)
+            return self._witness.record(task)
         self._grove = _Grove()
         stem = self._grove.plant(partial(_hold, self._grove.address, self._grove.folder, self._net, self._stack, task))
         deadline = time.monotonic() + self._timeout
@@ -94,7 +99,7 @@ class ForkEngine:
     ) -> list[Glimpse | Failure]:
         """See `Engine`."""
         if self._grove is None or not all(self._can_branch(task) for task in tasks):
-            return self.witness.glimpses(tasks, on_result)
+            return self._witness.glimpses(tasks, on_result)
         answers: dict[int, Glimpse | Failure] = {}
         for row, answer in self._branched(tasks):
             answers[row] = answer

@@ -33,6 +33,11 @@ class Engine(Protocol):
     name: str
     roadmap: RoadMap
 
+    @property
+    def witness(self) -> "Engine":
+        """An engine that shares nothing with this one but the task: the replay engine."""
+        ...
+
     def record(self, task: Task) -> Record:
         """One run with everything it leaves.
 

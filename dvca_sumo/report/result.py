@@ -67,6 +67,7 @@ def result_of(scenario: Scenario, faults: tuple[Fault, ...], found: Attribution,
         "messages": {"total": total, **{component.value: counts[component] for component in COMPONENTS}},
         "reduction_rate": 1.0 - 1.0 / total if has_message else 0.0,
         "planted": None if found.planted is None else _planted(found.planted),
+        "certificate": _certificate(found),
         "settled_at": _finite(found.until),
         "timing": {
             **msgspec.to_builtins(timing),
@@ -138,6 +139,22 @@ def _interval(found: Attribution) -> Json | None:
         "monotone": answer.is_monotone,
         "probes": [probe.id for probe in found.evidence],
     }
+
+
+def _certificate(found: Attribution) -> Json | None:
+    if not found.certificate:
+        return None
+    checks = [
+        {
+            "ideal": [component.value for component in check.question.ideal],
+            "from": None if check.question.since is None else _mark(check.question.since),
+            "expected": check.expected.value,
+            "outcome": check.outcome.value,
+            "same_run": check.is_same_run,
+        }
+        for check in found.certificate
+    ]
+    return {"agrees": all(check.agrees for check in found.certificate), "checks": checks}
 
 
 def _mark(mark: MessageMark) -> Json:

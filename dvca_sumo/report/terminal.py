@@ -44,6 +44,7 @@ def _lines(found: Attribution, timing: Timing) -> Iterator[str]:
     yield from _what_happened(found.violation, record)
     yield from _which_component(found)
     yield from _which_message(found)
+    yield from _certificate(found)
     yield from _planted(found)
     yield _cost(found, timing)
 
@@ -112,6 +113,13 @@ def _proof(found: Attribution) -> Iterator[str]:
         yield "           ideal after the last message before the violation -> violates, as driven"
     if answer.note:
         yield f"  note     {answer.note}"
+
+
+def _certificate(found: Attribution) -> Iterator[str]:
+    if found.certificate:
+        agreed = sum(check.agrees for check in found.certificate)
+        yield ""
+        yield f"CERTIFIED  {agreed} of {len(found.certificate)} conclusions hold when driven again from time 0"
 
 
 def _planted(found: Attribution) -> Iterator[str]:
