@@ -84,8 +84,7 @@ def loaded(text: str) -> Result:
 
     result: Result = json.loads(text, parse_constant=refused)
     schema = importlib.resources.files("dvca_sumo.report").joinpath("result.schema.json")
-    if schema.is_file():  # DEV
-      jsonschema.validate(result, json.loads(schema.read_text(encoding="utf-8")))
+    jsonschema.validate(result, json.loads(schema.read_text(encoding="utf-8")))
     return result
 
 

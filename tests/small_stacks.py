@@ -51,7 +51,7 @@ def _crash() -> None:
     os.kill(os.getpid(), signal.SIGSEGV)
 
 
-RAISING_CYCLE = 27
+RAISING_CYCLE = 57
 raising_localization = partial(spoilt, component="localization", call=10 * RAISING_CYCLE + 5, act=_raise)
 raising_perception = partial(spoilt, component="perception", call=RAISING_CYCLE, act=_raise)
 raising_prediction = partial(spoilt, component="prediction", call=RAISING_CYCLE, act=_raise)

@@ -32,7 +32,7 @@ from dvca_sumo.violations import Answer, Category, Violation
 # A counterfactual run is safe without any violation until so long after the factual one ...
 SETTLE = 8.0  # [s]
 # ... or so long, when by then it has left the place of the factual violation behind.
-LEAST_SETTLE = 2.0  # [s]
+LEAST_SETTLE = 4.0  # [s]
 PAST = 10.0  # [m]
 _HORIZON = float(PREDICTION_TIMES[-1])  # [s] the factual run goes on for, so that its last futures are whole
 
@@ -231,16 +231,26 @@ def _component_message(found: Attribution, dtest: Dtest, answer: ComponentAnswer
 
 
 def _certified(found: Attribution, witness: Dtest) -> Attribution:
-    if found.verdict is Verdict.COMPONENT and found.components is not None and found.components.component is not None:
-        certificate = certified(witness, found.evidence, (found.components.component,), Outcome.SAFE)
-    elif found.verdict is Verdict.PLANNING:
+    answer = found.components
+    if answer is None or answer.component is None:
+        return found
+    if found.verdict is Verdict.PLANNING:
         certificate = certified(witness, (), SUBSTITUTABLE, Outcome.VIOLATES)
     else:
-        return found
+        certificate = certified(witness, found.evidence, (answer.component,), Outcome.SAFE)
     if all(check.agrees for check in certificate):
         return replace(found, certificate=certificate)
     reason = f"the witness engine disagrees; without it: {found.reason}"
-    return replace(found, certificate=certificate, verdict=Verdict.UNRESOLVED, reason=reason)
+    return replace(
+        found,
+        certificate=certificate,
+        verdict=Verdict.UNRESOLVED,
+        reason=reason,
+        components=replace(answer, verdict=Verdict.UNRESOLVED, component=None),
+        messages=None,
+        message=None,
+        differences=(),
+    )
 
 
 def _planted(faults: tuple[Fault, ...], found: Attribution) -> Planted | None:

@@ -1,21 +1,22 @@
 """Synthetic drives along a straight road, and an engine that answers from a formula instead of a simulation."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import cast
 
 import numpy as np
-from interventions.scenes import Thing, ego, estimate, moment, occasion, predicted, road, tracked, trajectory
+from interventions.scenes import Thing, ego, estimate, moment, occasion, predicted, road, tracked, trajectory, walker
 from msgspec.structs import replace
 
+from dvca_sumo.analysis.attribution import Attribution, Progress, Request, explain
 from dvca_sumo.analysis.dtest import Dtest, Probe, Setting
 from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Glimpse
-from dvca_sumo.interventions import Futures, Gate, Ideal
+from dvca_sumo.interventions import Fault, Futures, Gate, Ideal, planted_fault
 from dvca_sumo.messages import COMPONENTS, Component, ControlCommand, Message, MessageId, Trajectory
 from dvca_sumo.record import Execution, Record
 from dvca_sumo.roadmap import RoadMap
-from dvca_sumo.run import Task
+from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.scenario.configuration import Configuration
 from dvca_sumo.thresholds import Thresholds
@@ -23,6 +24,7 @@ from dvca_sumo.truth import EgoTruth
 from dvca_sumo.violations import Answer, Category, Contact, Ending, Judgement, Violation
 
 START = 5.0  # [s] departure of every drive
+STOP = StopRule(after_violation=0.0, at=START + 12.0)
 SCENARIO = Scenario(
     Configuration(Path("/scenarios/street.sumocfg"), {}, Path("/street.net.xml"), (), ()), "ego", 1, 0.0, None, ()
 )
@@ -150,6 +152,10 @@ class FakeEngine:
         self._records = iter(records)
         self.tasks: list[Task] = []
 
+    @property
+    def witness(self) -> "FakeEngine":
+        return self
+
     def close(self) -> None:
         pass
 
@@ -174,7 +180,7 @@ def ideals(task: Task) -> dict[Component, Ideal]:
 
 
 def asking(engine: FakeEngine, *, jitters: tuple[int | None, ...] = (None,), is_mission: bool = False) -> Dtest:
-    setting = Setting(SCENARIO, (), Futures(), START + 12.0, START, is_mission, jitters)
+    setting = Setting(SCENARIO, (), Futures(), STOP, START, is_mission, jitters)
     heard: list[Probe] = []
     return Dtest(engine, setting, heard.append)
 
@@ -201,3 +207,48 @@ def needing(record: Record, component: Component, last: int, violation: Violatio
         return SAFE if is_safe else glimpse(violation)
 
     return answers
+
+
+MISS = "perception.miss"
+FAULTY = planted_fault(MISS)
+WALKER = walker("person:ped", 70.0, -1.7)
+HIT = collision(START + 4.4, "person:ped")
+FATAL = 29  # the last perception message that, being ideal, still prevents the hit
+
+
+def faulty_drive(*violations: Violation) -> Record:
+    """A drive in which perception misses a pedestrian from its tenth message on."""
+    record = drive([WALKER], violations=violations or (HIT,), ending=Ending.CUT)
+    record.altered[Component.PERCEPTION] = list(range(10, 60))
+    for index in record.altered[Component.PERCEPTION]:
+        time = record.mark(MessageId(Component.PERCEPTION, index)).time
+        record = saying(record, MessageId(Component.PERCEPTION, index), tracked([], time))
+    return record
+
+
+def answering(record: Record, enough: Mapping[Component, int]) -> Answers:
+    """A world where each of these components suffices if ideal from that message on, alone or with others."""
+
+    def answers(task: Task) -> Glimpse:
+        substituted = ideals(task)
+        is_enough = any(
+            component in substituted and first_substituted(record, substituted[component]) <= last
+            for component, last in enough.items()
+        )
+        return SAFE if is_enough else glimpse(*record.violations[:1], steps=44)
+
+    return answers
+
+
+def attributed(
+    record: Record,
+    answers: Answers,
+    *,
+    faults: tuple[Fault, ...] = (),
+    repeats: int | None = None,
+    again: Sequence[Record | Exception] = (),
+    witness: Answers | None = None,
+) -> Attribution:
+    """The whole of an attribution; `again` is what further runs of the factual task leave."""
+    engine, request = FakeEngine(answers, again), Request(SCENARIO, faults, repeats)
+    return explain(engine, request, record, Progress(), None if witness is None else FakeEngine(witness))

@@ -7,6 +7,7 @@ from analysis.scenes import (
     SAFE,
     SCENARIO,
     START,
+    STOP,
     VIOLATING,
     Answers,
     FakeEngine,
@@ -25,7 +26,7 @@ from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.interventions import Futures, Selection, planted_fault
 from dvca_sumo.messages import Component, MessageId
-from dvca_sumo.run import StopRule, Task
+from dvca_sumo.run import Task
 from dvca_sumo.violations import Category
 
 LOCALIZATION, PERCEPTION, CONTROL = Component.LOCALIZATION, Component.PERCEPTION, Component.CONTROL
@@ -89,7 +90,7 @@ def test_what_is_known_of_a_component_alone_is_known_by_message() -> None:
 def test_probe_ids_follow_the_order_of_the_questions_not_of_their_finishing() -> None:
     heard: list[Probe] = []
     engine = FakeEngine(only(PERCEPTION))
-    dtest = Dtest(engine, Setting(SCENARIO, (), Futures(), 20.0, START, False, (None,)), heard.append)
+    dtest = Dtest(engine, Setting(SCENARIO, (), Futures(), STOP, START, False, (None,)), heard.append)
     questions = [Question((component,)) for component in (LOCALIZATION, PERCEPTION, CONTROL)]
     dtest.ask(questions[0])
     dtest.ask_all(questions)
@@ -101,12 +102,12 @@ def test_probe_ids_follow_the_order_of_the_questions_not_of_their_finishing() ->
 
 def test_a_run_is_the_faults_then_the_substitutes_stopped_at_the_first_violation_or_when_settled() -> None:
     engine, fault = FakeEngine(only(PERCEPTION)), planted_fault("perception.miss")
-    dtest = Dtest(engine, Setting(SCENARIO, (fault,), Futures(), 20.0, START, False, (None,)), lambda _: None)
+    dtest = Dtest(engine, Setting(SCENARIO, (fault,), Futures(), STOP, START, False, (None,)), lambda _: None)
     dtest.ask(Question((LOCALIZATION, PERCEPTION), MARK))
     (task,) = engine.tasks
     assert task.interventions[0] == fault
     assert [one.component for one in task.interventions[1:]] == [LOCALIZATION, PERCEPTION]
-    assert task.stop == StopRule(after_violation=0.0, at=20.0)
+    assert task.stop == STOP
     assert task.jitter is None
 
 

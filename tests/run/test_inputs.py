@@ -13,6 +13,7 @@ from small_scenarios import EGO, driven, scenario_file
 
 from dvca_sumo.record import Record
 from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.run import StopRule
 from dvca_sumo.scenario import ScenarioError
 from dvca_sumo.violations import Ending
 
@@ -187,6 +188,23 @@ def test_vehicles_flows_and_trips_as_egos(tmp_path: Path, street: Path, element:
     start = f'<{element} id="ego" {when[element]} departPos="20" departSpeed="10" arrivalPos="60">'
     record = arrived_leaving_all_as_it_was(scenario_file(tmp_path, street, f"{start}{within}</{element}>"), tmp_path)
     assert record.ego == name
+
+
+def test_auto_takes_a_trip_that_is_long_enough(tmp_path: Path, street: Path) -> None:
+    def flow(name: str, edges: str) -> str:
+        return f'<flow id="{name}" begin="0" period="5" number="20"><route edges="{edges}"/></flow>'
+
+    config = scenario_file(tmp_path, street, flow("short", "nb bs") + flow("long", "ab bc cb ba"))
+    record = driven(config, ego="auto", stop=StopRule(at=70.0))
+    assert record.ego.startswith("long.")
+    assert record.start >= 60.0
+    assert record.route.destination - record.route.start > 500.0
+
+
+def test_auto_does_not_take_a_short_trip(tmp_path: Path, street: Path) -> None:
+    flow = '<flow id="short" begin="0" period="5" number="20"><route edges="nb bs"/></flow>'
+    with pytest.raises(ScenarioError, match="no vehicle fit to be the ego departs between 0 s and"):
+        driven(scenario_file(tmp_path, street, flow), ego="auto")
 
 
 def test_the_end_of_a_scenario_ends_the_drive(tmp_path: Path, street: Path) -> None:

@@ -9,7 +9,7 @@ from small_scenarios import driven, scenario_file
 from dvca_sumo.interventions import planted_fault
 from dvca_sumo.messages import COMPONENTS, Component
 from dvca_sumo.record import Record
-from dvca_sumo.run import Task
+from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import load_scenario
 
 EGO = '<trip id="ego" from="bc" to="bc" depart="0" departPos="20" departSpeed="8" departLane="0" arrivalPos="150"/>'
@@ -18,6 +18,7 @@ STOPPED = (
     '<stop lane="bc_0" endPos="111" duration="1000"/></vehicle>'
 )
 DAWDLING = '<flow id="many" begin="0" period="2" number="20" from="cb" to="ba" departLane="random" departPos="random"/>'
+SHORT = StopRule(at=3.0)
 
 
 @pytest.fixture
@@ -37,21 +38,21 @@ def test_the_same_task_twice_gives_the_same_digest(config: Path) -> None:
 
 
 def test_another_seed_gives_other_noise_and_other_traffic(config: Path) -> None:
-    first, other = driven(config, seed=1), driven(config, seed=2)
+    first, other = driven(config, seed=1, stop=SHORT), driven(config, seed=2, stop=SHORT)
     assert first.digest != other.digest
     assert first.executions[Component.LOCALIZATION][0] != other.executions[Component.LOCALIZATION][0]
     assert traffic(first) != traffic(other)
 
 
 def test_a_jitter_number_repeats_itself_and_differs_from_every_other(config: Path) -> None:
-    runs = [driven(config, jitter=number) for number in (None, 0, 1, 0)]
+    runs = [driven(config, jitter=number, stop=SHORT) for number in (None, 0, 1, 0)]
     digests = [run.digest for run in runs]
     assert digests[1] == digests[3]
     assert len(set(digests)) == 3
 
 
 def test_jitter_shifts_components_and_noise_but_not_sumos_drivers(config: Path) -> None:
-    runs = [driven(config, jitter=number) for number in (None, *range(6))]
+    runs = [driven(config, jitter=number, stop=SHORT) for number in (None, *range(6))]
     for component, count in ((Component.PERCEPTION, 2), (Component.PREDICTION, 2), (Component.PLANNING, 2)):
         phases = {run.executions[component][0].tick % 10 for run in runs}
         assert len(phases) >= count

@@ -1,0 +1,94 @@
+"""The same as the command, in three calls from Python."""
+
+from pathlib import Path
+
+import pytest
+from command_line import typed
+from small_scenarios import scenario_file
+
+import dvca_sumo
+from dvca_sumo.analysis.attribution import Attribution, Progress
+from dvca_sumo.analysis.components import Verdict
+from dvca_sumo.analysis.dtest import Probe
+from dvca_sumo.api import FactualDrive
+from dvca_sumo.interventions import FaultError
+from dvca_sumo.messages import Component
+from dvca_sumo.scenario import ScenarioError
+from dvca_sumo.stack.reference import StackError
+
+FAULT = "planning.path"
+CS5 = "nets/cs5.sumocfg"
+
+
+class Heard(Progress):
+    def __init__(self) -> None:
+        self.probes: list[Probe] = []
+
+    def probe(self, probe: Probe) -> None:
+        self.probes.append(probe)
+
+
+@pytest.fixture(scope="module")
+def drive() -> FactualDrive:
+    return dvca_sumo.run(dvca_sumo.load_scenario(CS5), faults=[FAULT])
+
+
+@pytest.fixture(scope="module")
+def heard() -> Heard:
+    return Heard()
+
+
+@pytest.fixture(scope="module")
+def answer(drive: FactualDrive, heard: Heard) -> Attribution:
+    return dvca_sumo.attribute(drive, heard)
+
+
+def test_three_calls_explain_a_violation(drive: FactualDrive, answer: Attribution) -> None:
+    assert [one.kind for one in drive.record.violations][:1] == ["lane_departure"]
+    assert answer.violation == drive.record.violations[0]
+    assert answer.verdict is Verdict.PLANNING
+    assert answer.message is not None
+    assert answer.message.component is Component.PLANNING
+    assert answer.is_reproducible
+    assert answer.planted is not None
+    assert answer.planted.message_success
+
+
+def test_progress_hears_of_every_probe(answer: Attribution, heard: Heard) -> None:
+    assert sorted(probe.id for probe in heard.probes) == [probe.id for probe in answer.probes]
+
+
+def test_the_command_says_the_same(answer: Attribution) -> None:
+    result = typed("run", CS5, "--fault", FAULT, "--json").result
+    assert result["digest"] == answer.digest
+    assert result["verdict"] == answer.verdict.value
+    assert answer.message is not None
+    assert result["message"]["index"] == answer.message.index
+
+
+def test_a_clean_drive_has_nothing_to_explain(tmp_path: Path, street: Path) -> None:
+    scenario = dvca_sumo.load_scenario(str(scenario_file(tmp_path / "free", street)), seed=3)
+    assert scenario.seed == 3
+    answer = dvca_sumo.attribute(dvca_sumo.run(scenario))
+    assert (answer.verdict, answer.violation, answer.probes, answer.planted) == (Verdict.NONE, None, (), None)
+
+
+def test_a_built_in_scenario_is_found_from_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert dvca_sumo.load_scenario(Path(CS5)).configuration.path.name == "cs5.sumocfg"
+
+
+def test_errors_are_named_for_what_was_wrong(tmp_path: Path) -> None:
+    scenario = dvca_sumo.load_scenario(CS5)
+    with pytest.raises(ScenarioError, match="no such SUMO configuration"):
+        dvca_sumo.load_scenario(tmp_path / "none.sumocfg")
+    with pytest.raises(FaultError, match="did you mean 'planning.path'"):
+        dvca_sumo.run(scenario, faults=["planning.pat"])
+    with pytest.raises(StackError, match="nowhere:stack"):
+        dvca_sumo.run(scenario, stack="nowhere:stack")
+
+
+def test_the_package_offers_the_three_calls_and_nothing_unknown() -> None:
+    assert set(dvca_sumo.__all__) == {"load_scenario", "run", "attribute"}
+    with pytest.raises(AttributeError, match="no attribute 'explain'"):
+        dvca_sumo.explain  # type: ignore[attr-defined]  # noqa: B018
