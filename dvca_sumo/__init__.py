@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 if TYPE_CHECKING:
-    from dvca_sumo.api import attribute, load_scenario, run
+    from dvca_sumo.api import attribute, drive, load_scenario
 
-__all__ = ["attribute", "load_scenario", "run"]
+__all__ = ["attribute", "drive", "load_scenario"]
 
 
 def __getattr__(name: str) -> object:

@@ -1,7 +1,7 @@
 """The same as the command line, from Python: load a scenario, run it, attribute it.
 
 >>> scenario = dvca_sumo.load_scenario("nets/cs1.sumocfg")
->>> drive = dvca_sumo.run(scenario, faults=["perception.miss"])
+>>> drive = dvca_sumo.drive(scenario, faults=["perception.miss"])
 >>> answer = dvca_sumo.attribute(drive)
 """
 
@@ -45,7 +45,7 @@ def load_scenario(
     return _load_scenario(scenario_path(Path(path)), ego, seed, begin, end)
 
 
-def run(
+def drive(
     scenario: Scenario,
     faults: Sequence[str] = (),
     stack: str | None = None,

@@ -117,7 +117,7 @@ def run(
         raise click.UsageError("--repeats goes with --jitter: in exact mode every run is the same")
     terminal = _Terminal(engine, jobs)
     scenario = load_scenario(sumocfg, ego, seed, begin, end)
-    drive = api.run(scenario, faults, stack, (repeats or _REPEATS) if jitter else None, jobs, engine)
+    drive = api.drive(scenario, faults, stack, (repeats or _REPEATS) if jitter else None, jobs, engine)
     terminal.factual(drive.record)
     try:
         found = api.attribute(drive, terminal, certify=certify)

@@ -30,7 +30,7 @@ class Heard(Progress):
 
 @pytest.fixture(scope="module")
 def drive() -> FactualDrive:
-    return dvca_sumo.run(dvca_sumo.load_scenario(CS5), faults=[FAULT])
+    return dvca_sumo.drive(dvca_sumo.load_scenario(CS5), faults=[FAULT])
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_the_command_says_the_same(answer: Attribution) -> None:
 def test_a_clean_drive_has_nothing_to_explain(tmp_path: Path, street: Path) -> None:
     scenario = dvca_sumo.load_scenario(str(scenario_file(tmp_path / "free", street)), seed=3)
     assert scenario.seed == 3
-    answer = dvca_sumo.attribute(dvca_sumo.run(scenario))
+    answer = dvca_sumo.attribute(dvca_sumo.drive(scenario))
     assert (answer.verdict, answer.violation, answer.probes, answer.planted) == (Verdict.NONE, None, (), None)
 
 
@@ -82,13 +82,13 @@ def test_errors_are_named_for_what_was_wrong(tmp_path: Path) -> None:
     scenario = dvca_sumo.load_scenario(CS5)
     with pytest.raises(ScenarioError, match="no such SUMO configuration"):
         dvca_sumo.load_scenario(tmp_path / "none.sumocfg")
-    with pytest.raises(FaultError, match="did you mean 'planning.path'"):
-        dvca_sumo.run(scenario, faults=["planning.pat"])
+    with pytest.raises(FaultError, match=r"did you mean 'planning\.path'"):
+        dvca_sumo.drive(scenario, faults=["planning.pat"])
     with pytest.raises(StackError, match="nowhere:stack"):
-        dvca_sumo.run(scenario, stack="nowhere:stack")
+        dvca_sumo.drive(scenario, stack="nowhere:stack")
 
 
 def test_the_package_offers_the_three_calls_and_nothing_unknown() -> None:
-    assert set(dvca_sumo.__all__) == {"load_scenario", "run", "attribute"}
+    assert set(dvca_sumo.__all__) == {"load_scenario", "drive", "attribute"}
     with pytest.raises(AttributeError, match="no attribute 'explain'"):
-        dvca_sumo.explain  # type: ignore[attr-defined]  # noqa: B018
+        dvca_sumo.explain  # noqa: B018

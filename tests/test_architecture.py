@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "dvca_sumo"
 FOLDERS_OUTSIDE = ("faults", "nets", "routes")  # installed below the package, kept at the top
 SIMULATOR_ROOM = "dvca_sumo.world.session"
-TRUTH_ROOMS = ("dvca_sumo.stack.sensors", "dvca_sumo.stack.ideal")
+TRUTH_ROOMS = {"dvca_sumo.stack.sensors", "dvca_sumo.stack.ideal"}
 
 
 def _module(path: Path) -> str:
@@ -88,11 +88,15 @@ def test_one_module_holds_the_simulator() -> None:
     assert _importers("traci") <= {SIMULATOR_ROOM}
 
 
-def test_the_stack_meets_the_truth_in_two_modules_only() -> None:
-    in_stack = {module for module in _importers("dvca_sumo.truth") if module.startswith("dvca_sumo.stack")}
-    assert in_stack == set(TRUTH_ROOMS)
+@pytest.mark.parametrize("known", ["truth", "record", "interventions", "world", "oracles"])
+def test_only_sensors_and_substitutes_of_the_stack_know_more_than_their_input(known: str) -> None:
+    knowing = {module for module in _importers(f"dvca_sumo.{known}") if module.startswith("dvca_sumo.stack")}
+    assert knowing <= TRUTH_ROOMS
+
+
+def test_no_component_meets_the_sensors_or_the_substitutes() -> None:
     users = {module for room in TRUTH_ROOMS for module in _importers(room) if module.startswith("dvca_sumo.stack")}
-    assert users == {"dvca_sumo.stack.reference"}  # which builds the sensors, and hands them on to the run
+    assert users == {"dvca_sumo.stack.reference"}  # which builds the sensors for the run
 
 
 def test_nothing_is_left_to_be_done() -> None:

@@ -30,7 +30,7 @@ from dvca_sumo.stack.reference import StackError
 from dvca_sumo.violations import Answer, Category, Violation
 
 # A counterfactual run is safe without any violation until so long after the factual one ...
-SETTLE = 8.0  # [s]
+SETTLE = 6.0  # [s]
 # ... or so long, when by then it has left the place of the factual violation behind.
 LEAST_SETTLE = 4.0  # [s]
 PAST = 10.0  # [m]

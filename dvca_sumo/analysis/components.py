@@ -28,7 +28,8 @@ from dvca_sumo.record import MessageMark, Record
 # In the order of the data flow: an idealized component may hide the fault of one before it.
 SUBSTITUTABLE = (Component.LOCALIZATION, Component.PERCEPTION, Component.PREDICTION, Component.CONTROL)
 
-UPSTREAM = 4
+UPSTREAM = 2
+_AHEAD = 2  # levels that are asked together at first: run side by side, they cost hardly more than one
 _VECTOR = 8.0  # [s] before the violation from which single substitutions are shown when none can be enough
 
 
@@ -68,9 +69,8 @@ def responsible_component(dtest: Dtest, record: Record, time: float) -> Componen
 
 def first_questions(record: Record, time: float) -> list[Question]:
     """What `responsible_component` will ask first whatever the answers, to be asked ahead."""
-    return [
-        Question(SUBSTITUTABLE, mark_before(record, Component.LOCALIZATION, time, lookbacks(record.start, time)[0]))
-    ]
+    first = lookbacks(record.start, time)[:_AHEAD]
+    return [Question(SUBSTITUTABLE, mark_before(record, Component.LOCALIZATION, time, back)) for back in first]
 
 
 def mark_before(record: Record, component: Component, time: float, back: float | None) -> MessageMark | None:

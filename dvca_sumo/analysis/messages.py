@@ -1,6 +1,6 @@
 """Message level: the last message of the responsible component that could still have prevented it (Definition 11)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import msgspec
 
@@ -48,16 +48,16 @@ def violation_inducing_message(
     def question(index: int) -> Question:
         return Question((component,), marks[index] if index > 0 else None)
 
-    def test(index: int) -> Outcome:
-        return dtest.ask(question(index))
+    def test_all(indices: Sequence[int]) -> list[Outcome]:
+        return dtest.ask_all([question(index) for index in indices])
 
     def known() -> dict[int, Outcome]:
         return {begins[index]: outcome for index, outcome in dtest.known(component).items()}
 
-    bracket = bisect(test, _bracket(known(), len(marks)), states)
+    bracket = bisect(test_all, _bracket(known(), len(marks)), states)
     if is_exact:
-        bracket = bisect(test, bracket)
-    _ask_around(test, states, dtest.known(component), bracket)
+        bracket = bisect(test_all, bracket)
+    _ask_around(test_all, states, dtest.known(component), bracket)
     is_monotone = _is_monotone(known(), bracket)
     low = bracket.low
     if not is_exact:
@@ -104,12 +104,13 @@ def _are_neighbours(states: list[int], bracket: Bracket, count: int) -> bool:
     return not between
 
 
-def _ask_around(test: Callable[[int], Outcome], states: list[int], known: dict[int, Outcome], bracket: Bracket) -> None:
+def _ask_around(
+    test_all: Callable[[Sequence[int]], list[Outcome]], states: list[int], known: dict[int, Outcome], bracket: Bracket
+) -> None:
     """One state to either side, where nothing farther out was asked before."""
     before = [one for one in states if 0 < one < bracket.low] if min(known) >= bracket.low else []
     after = [one for one in states if one > bracket.high] if max(known) <= bracket.high else []
-    for index in (*before[-1:], *after[:1]):
-        test(index)
+    test_all([*before[-1:], *after[:1]])
 
 
 def _is_monotone(known: dict[int, Outcome], bracket: Bracket) -> bool:

@@ -41,6 +41,7 @@ class Parked(msgspec.Struct, frozen=True):
     """A checkpoint says that it is there."""
 
     step: int  # world steps driven
+    process: int
 
 
 class Started(msgspec.Struct, frozen=True):
@@ -152,7 +153,7 @@ class Holder:
         self._is_stem = False
         self._connection.close()  # the other end must see when its owner dies
         self._connection = Client(self._address, "AF_UNIX")
-        self._connection.send(Parked(step))
+        self._connection.send(Parked(step, os.getpid()))
         while True:
             try:
                 order: Order = self._connection.recv()

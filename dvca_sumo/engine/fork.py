@@ -42,6 +42,7 @@ class _Checkpoint(msgspec.Struct, frozen=True):
     """A parked process."""
 
     step: int
+    process: int
     connection: Connection
 
 
@@ -73,6 +74,11 @@ class ForkEngine:
         """See `Engine`."""
         return self._witness
 
+    @property
+    def checkpoint_processes(self) -> tuple[int, ...]:
+        """The parked processes, by their step."""
+        return tuple(one.process for one in sorted(self._checkpoints, key=lambda one: one.step))
+
     def record(self, task: Task) -> Record:
         """See `Engine`. The run's checkpoints stay until `close` or the next factual run."""
         if task.jitter is not None or self._factual is not None:
@@ -83,7 +89,7 @@ class ForkEngine:
         while True:
             for connection, message in self._grove.heard(deadline):
                 if isinstance(message, Parked):
-                    self._checkpoints.append(_Checkpoint(message.step, connection))
+                    self._checkpoints.append(_Checkpoint(message.step, message.process, connection))
                 elif isinstance(message, Delivered):
                     return self._taken(task, message)
                 elif message is None:
@@ -141,7 +147,7 @@ class ForkEngine:
                 running[row] = time.monotonic() + self._timeout
             for connection, message in self._grove.heard(min(running.values())):
                 if isinstance(message, Parked):
-                    self._checkpoints.append(_Checkpoint(message.step, connection))
+                    self._checkpoints.append(_Checkpoint(message.step, message.process, connection))
                 elif isinstance(message, Started):
                     branches[connection] = (message.order, message.process)
                 elif isinstance(message, Delivered):

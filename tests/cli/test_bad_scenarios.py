@@ -10,7 +10,7 @@ from small_scenarios import EGO
 
 from dvca_sumo.cli import ExitCode
 
-Spoil = Callable[[Path], None]  # of the scenario's folder
+Spoil = Callable[[Path], object]  # of the scenario's folder
 
 MARKED = '<vehicle id="{0}" depart="0"><route edges="bc"/><param key="dvca.ego" value="true"/></vehicle>'
 
@@ -28,14 +28,14 @@ def _truncated(name: str) -> Spoil:
 
 
 def _replaced(name: str, text: str) -> Spoil:
-    return lambda folder: (folder / name).write_text(text, encoding="utf-8") and None
+    return lambda folder: (folder / name).write_text(text, encoding="utf-8")
 
 
 class Broken(NamedTuple):
     """A scenario with one defect, and what must be said of it."""
 
     says: tuple[str, ...]
-    spoil: Spoil = contents  # type: ignore[assignment]  # only looks
+    spoil: Spoil = contents  # only looks
     routes: str = EGO
     additional: str = ""
     options: tuple[tuple[str, str], ...] = ()
@@ -45,7 +45,7 @@ class Broken(NamedTuple):
 BROKEN = {
     "no sumocfg, one of a similar name": Broken(
         ("no such SUMO configuration", "did you mean runs.sumocfg?"),
-        lambda folder: (folder / "run.sumocfg").rename(folder / "runs.sumocfg") and None,
+        lambda folder: (folder / "run.sumocfg").rename(folder / "runs.sumocfg"),
     ),
     "sumocfg cut off": Broken(("run.sumocfg is not well-formed XML", "line 1"), _truncated("run.sumocfg")),
     "sumocfg empty": Broken(("run.sumocfg is not well-formed XML",), _replaced("run.sumocfg", "")),

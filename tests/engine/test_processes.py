@@ -6,7 +6,7 @@ import select
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -170,6 +170,15 @@ def test_leaving_early_ends_what_still_runs(tmp_path: Path) -> None:
     assert not is_alive(process)
 
 
+@pytest.fixture
+def _interruptible() -> Iterator[None]:
+    """A worker of pytest-xdist ignores interrupts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("_interruptible")
 def test_an_interrupt_ends_the_children_and_goes_on_up(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -191,6 +200,7 @@ def test_an_interrupt_ends_the_children_and_goes_on_up(tmp_path: Path) -> None:
     assert not is_alive(process)
 
 
+@pytest.mark.usefixtures("_interruptible")
 def test_children_leave_an_interrupt_of_the_terminal_to_their_parent() -> None:
     (answer,) = answers([lambda: [signal.raise_signal(signal.SIGINT), "still here"]])  # type: ignore[func-returns-value]
     assert answer == [None, "still here"]

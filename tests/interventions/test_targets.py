@@ -38,6 +38,11 @@ def test_what_is_behind_or_far_away_is_not_in_the_way(thing: Thing) -> None:
     assert found(thing) is None
 
 
+def test_a_person_beside_the_egos_flank_is_not_in_the_way() -> None:
+    assert found(walker("beside", 22.0, 1.3)) is None
+    assert found(walker("before", 24.0, 1.3)) == "before"
+
+
 def test_what_reaches_into_the_egos_width_is_in_the_way_and_just_beside_it_is_not() -> None:
     cone = Thing("cone", 45.0, 1.0, kind=ObjectClass.STATIC, size=(0.4, 0.4))  # reach: (1.8 + 0.4) / 2 + 0.3
     assert found(cone) == "cone"
