@@ -157,7 +157,7 @@ def test_the_search_begins_just_before_the_violation_and_stops_where_it_is_preve
 def test_a_component_is_asked_no_later_than_where_all_together_are_enough() -> None:
     found, questions = asked_of(enough_before(together=1.5, perception=7.0))
     assert found.component is Component.PERCEPTION
-    assert backs(questions, Component.PERCEPTION) == [2.0, 4.0]
+    assert backs(questions, Component.PERCEPTION) == [2.0, 4.0, 8.0]
 
 
 def test_upstream_components_are_asked_a_while_further_back_than_the_one_that_is_enough() -> None:

@@ -185,6 +185,26 @@ def test_an_ego_past_the_end_of_the_net_stays(tmp_path: Path, street: Path) -> N
     assert asked(config, 60, lambda sumo: sumo.vehicle.getIDList(), speed=10.0) == ("ego",)
 
 
+@pytest.mark.parametrize("left", [-3.0, 3.0])
+def test_an_ego_beside_the_road_is_where_it_is(tmp_path: Path, street: Path, left: float) -> None:
+    config = scenario_file(tmp_path, street, STANDING)
+    last = watched(config, 50, speed=5.0, left=left)[-1]
+    assert abs(last.ego.y) > 8.0
+    x, y = asked(config, 50, lambda sumo: sumo.vehicle.getPosition("ego"), speed=5.0, left=left)
+    assert (x, y) == pytest.approx((last.ego.x + last.shape.front, last.ego.y), abs=0.01)
+
+
+@pytest.mark.parametrize("steps", [9, 12, 15])
+def test_drivers_are_told_the_egos_true_speed_on_a_junction(tmp_path: Path, street: Path, steps: int) -> None:
+    ego = STANDING.replace('from="bc"', 'from="ab"').replace('"20"', '"185"')
+    config = scenario_file(tmp_path, street, ego)
+    road, speed = asked(
+        config, steps, lambda sumo: (sumo.vehicle.getRoadID("ego"), sumo.vehicle.getSpeed("ego")), speed=10.0
+    )
+    assert road.startswith(":b_")
+    assert speed == pytest.approx(10.0, abs=0.01)
+
+
 def test_vehicles_that_collide_with_the_ego_are_not_removed(tmp_path: Path, street: Path) -> None:
     config = scenario_file(tmp_path, street, STANDING + CAR_IN_THE_WAY, collision__action="remove")
     moments = watched(config, 70, speed=10.0)

@@ -23,18 +23,18 @@ def entered(config: Path, ego: str | None = None, settings: tuple[str, ...] = ()
     return in_child(lambda: _world(config, ego, settings)[1])
 
 
-def watched(config: Path, steps: int, speed: float = 0.0) -> list[Moment]:
-    """What is seen around an ego that goes straight on at `speed`, at its departure and after every step."""
-    return in_child(lambda: list(_watch(config, steps, speed)[0]))
+def watched(config: Path, steps: int, speed: float = 0.0, left: float = 0.0) -> list[Moment]:
+    """What is seen around an ego that goes on at `speed`, and `left` of it, at its departure and after every step."""
+    return in_child(lambda: _watch(config, steps, speed, left))
 
 
-def asked(config: Path, steps: int, question: Callable[[Any], Any], speed: float = 0.0) -> Any:
+def asked(config: Path, steps: int, question: Callable[[Any], Any], speed: float = 0.0, left: float = 0.0) -> Any:
     """What libsumo answers to `question(libsumo)` after so many steps of such an ego."""
 
     def job() -> Any:
         import libsumo  # noqa: PLC0415 one simulation a process: never in the tests' own
 
-        _watch(config, steps, speed)
+        _watch(config, steps, speed, left)
         return question(libsumo)
 
     return in_child(job)
@@ -52,14 +52,14 @@ def _world(config: Path, ego: str | None, settings: tuple[str, ...]) -> tuple[Wo
         return world, world.await_ego(settings, lambda _: True)
 
 
-def _watch(config: Path, steps: int, speed: float) -> tuple[list[Moment], World]:
+def _watch(config: Path, steps: int, speed: float, left: float) -> list[Moment]:
     world, entry = _world(config, None, ())
     roadmap = RoadMap.load(load_scenario(config).configuration.net, entry.vehicle_class)
     end = roadmap.lanes[f"{entry.edges[-1]}_0"].length
     ego = world.adopt(entry, roadmap.route(entry.edges, entry.lane, entry.position, None, end), VehicleLimits())
     moments = [world.observe(ego)]
     for _ in range(steps):
-        ego.vehicle.advance(ControlCommand(world.time, 0.0, 0.0, PoseStep(speed * STEP, 0.0, 0.0, 0.0)), STEP)
+        ego.vehicle.advance(ControlCommand(world.time, 0.0, 0.0, PoseStep(speed * STEP, left * STEP, 0.0, 0.0)), STEP)
         world.advance()
         moments.append(world.observe(ego))
-    return moments, world
+    return moments
