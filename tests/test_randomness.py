@@ -18,7 +18,7 @@ def test_more_draws_of_a_key_begin_with_the_same_ones() -> None:
 
 
 def test_draws_are_the_same_on_every_machine() -> None:
-    assert uniforms(42, 1, 2, [3], 2)[0].tolist() == [0.06802375135086153, 0.49945206387426216]
+    assert uniforms(42, 1, 2, [3], 2)[0].tolist() == [0.5543828504727022, 0.6288823390205138]
 
 
 @pytest.mark.parametrize("other", [(8, 3, 11, 5), (7, 4, 11, 5), (7, 3, 12, 5), (7, 3, 11, 6)])
@@ -66,3 +66,7 @@ def test_names_have_stable_keys_of_their_own() -> None:
     assert key_of("person:ped") == 1984973771
     names = [f"flow.{number}" for number in range(2000)]
     assert len({key_of(name) for name in names}) == len(names)
+
+
+def test_seed_and_stream_do_not_change_places() -> None:
+    assert uniforms(7, 3, 0, [1], 1) != uniforms(3, 7, 0, [1], 1)

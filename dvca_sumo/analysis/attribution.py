@@ -136,11 +136,12 @@ def explain(
         for answer in _steps(found, engine, dtest, request):
             found = answer
         if witness is not None:
-            found = _certified(found, Dtest(witness, setting, progress.probe))
+            second = Dtest(witness, setting, progress.probe, len(dtest.probes))
+            found = replace(_certified(found, second), probes=tuple(second.probes))
     except KeyboardInterrupt:
         partial = replace(found, probes=tuple(dtest.probes), reason="interrupted")
         raise AttributionStoppedError(partial) from None
-    return replace(found, probes=tuple(dtest.probes), planted=_planted(request.faults, found))
+    return replace(found, probes=(*dtest.probes, *found.probes), planted=_planted(request.faults, found))
 
 
 def attribute(engine: Engine, request: Request, progress: Progress) -> Attribution:

@@ -64,11 +64,12 @@ class Setting(msgspec.Struct, frozen=True):
 class Dtest:
     """Asks counterfactual questions of an engine."""
 
-    def __init__(self, engine: Engine, setting: Setting, on_probe: Callable[[Probe], None]) -> None:
+    def __init__(self, engine: Engine, setting: Setting, on_probe: Callable[[Probe], None], first_id: int = 0) -> None:
         self._engine = engine
         self._setting = setting
         self._on_probe = on_probe
         self._answers: dict[_Run, Outcome] = {}
+        self._first_id = first_id
         self.probes: list[Probe] = []
 
     @property
@@ -90,7 +91,7 @@ class Dtest:
             asked.setdefault(self._run(question), question)
         new = [question for run, question in asked.items() if run not in self._answers]
         runs = [(question, jitter) for question in new for jitter in self._setting.jitters]
-        first = len(self.probes)
+        first = self._first_id + len(self.probes)
 
         def made(row: int, answer: Glimpse | Failure) -> Probe:
             return _probe(first + row, *runs[row], answer, self._setting)

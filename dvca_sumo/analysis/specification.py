@@ -14,6 +14,8 @@ from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.frames import relative, transferred
 from dvca_sumo.messages import ACCELERATION, CURVATURE, HEADING, SPEED, Component, MessageId, Trajectory, X, Y
 from dvca_sumo.oracles import judge, judges
+from dvca_sumo.oracles.no_progress import NoProgress
+from dvca_sumo.oracles.place import Places
 from dvca_sumo.record import MessageMark, Record
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.thresholds import Thresholds
@@ -39,9 +41,11 @@ def first_violating_plan(
     """The first planning message that itself leads to `violation`, or None when none does.
 
     For safety and traffic rules: it is missing, does not begin where the ego is, or breaks a rule of
-    the violation's family when driven for `FORESIGHT`. For missions: it is missing, or plans to stand.
+    the violation's family when driven for `FORESIGHT`. For missions: it is missing, does not begin
+    where the ego is, or plans to stand without a reason.
     """
     executions = record.executions[Component.PLANNING]
+    waiting = NoProgress(Places(record.route, roadmap), thresholds)
     for index, execution in enumerate(executions):
         mark = record.mark(MessageId(Component.PLANNING, index))
         if mark.time > violation.time:
@@ -50,7 +54,11 @@ def first_violating_plan(
             return PlanningFinding(mark, "no trajectory was published")
         reason = _discontinuity(record, execution.message, execution.tick)
         if not reason and violation.category is Category.MISSION:
-            reason = _standstill(execution.message, mark, violation, thresholds)
+            moment = record.moment_at(execution.tick)
+            waiting.observe(moment)  # it follows the ego along its route
+            begun = violation.time - thresholds.no_progress_time if violation.kind == NoProgress.kind else -math.inf
+            if mark.time >= begun and violation.kind != "destination_overrun" and not waiting.has_reason(moment):
+                reason = _standstill(execution.message)
         elif not reason:
             reason = _breach(record, roadmap, thresholds, execution.message, execution.tick, violation)
         if reason:
@@ -70,12 +78,9 @@ def _discontinuity(record: Record, trajectory: Trajectory, tick: int) -> str:
     return ""
 
 
-def _standstill(trajectory: Trajectory, mark: MessageMark, violation: Violation, thresholds: Thresholds) -> str:
-    begun = violation.time - thresholds.no_progress_time
-    if violation.kind == "no_progress" and mark.time < begun:
-        return ""
-    if float(trajectory.points[:, SPEED].max()) < _STANDING and violation.kind != "destination_overrun":
-        return f"the trajectory stands still ({trajectory.decision})"
+def _standstill(trajectory: Trajectory) -> str:
+    if float(trajectory.points[:, SPEED].max()) < _STANDING:
+        return f"the trajectory stands still without a reason ({trajectory.decision})"
     return ""
 
 

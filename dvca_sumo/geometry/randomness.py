@@ -39,7 +39,7 @@ def uniforms(seed: int, stream: int, index: int, keys: npt.ArrayLike, count: int
 
     Row k depends on (seed, stream, index, keys[k]) alone.
     """
-    root = seed & _WORD
+    root = _mixed(seed & _WORD)  # or seed and stream could change places
     for part in (stream, index):
         root = _mixed(((root + _GOLDEN) & _WORD) ^ (part & _WORD))
     rows = _mix(np.uint64((root + _GOLDEN) & _WORD) ^ np.atleast_1d(np.asarray(keys, dtype=np.uint64)))

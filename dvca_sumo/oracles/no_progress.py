@@ -57,7 +57,7 @@ class NoProgress:
             self._is_reported = False
             self._idle_since = self._unexplained_since = moment.time
             return self._findings.next()
-        if self._has_reason(moment):
+        if self.has_reason(moment):
             self._idle_since = self._unexplained_since = moment.time
         elif self._is_signal_unknown(moment):
             self._idle_since = moment.time
@@ -81,7 +81,8 @@ class NoProgress:
         elif moment.time - self._unexplained_since >= limit - 1e-9:
             self._blind = f"the colour of the signal ahead was not known at {moment.time:.1f} s"
 
-    def _has_reason(self, moment: Moment) -> bool:
+    def has_reason(self, moment: Moment) -> bool:
+        """Whether there is a reason to stand: the destination, a signal, something in the way, traffic that crosses."""
         place, route = self._places.at(moment), self._places.route
         if abs(place.station - route.destination) <= self._thresholds.destination_tolerance:
             return True

@@ -1,5 +1,6 @@
 """What is run: a user's SUMO configuration, its ego, and the settings a truthful run needs."""
 
+import math
 import os
 from pathlib import Path
 
@@ -75,6 +76,9 @@ def load_scenario(
     options = configuration.options
     chosen_seed = seed if seed is not None else _whole(options.get("seed", str(_SUMO_SEED)), "seed")
     chosen_begin = begin if begin is not None else seconds(options.get("begin", "0"), "begin")
+    for name, value in (("begin", begin), ("end", end)):
+        if value is not None and not (math.isfinite(value) and value >= 0.0):
+            raise ScenarioError(f"{name} is no time: {value} (allowed: seconds, 0 or more)")
     configured_end = seconds(options["end"], "end") if "end" in options else -1.0
     chosen_end = end if end is not None else (configured_end if configured_end > 0 else None)
     if chosen_end is not None and chosen_end <= chosen_begin:

@@ -171,7 +171,7 @@ def test_a_plan_to_stand_is_the_one_for_a_destination_that_is_not_reached() -> N
     finding = first(still(drive(plan=standing)), late)
     assert finding is not None
     assert finding.mark.index == 0
-    assert "stands still (stop phantom)" in finding.reason
+    assert "stands still without a reason (stop phantom)" in finding.reason
     assert first(drive(), late) is None
 
 

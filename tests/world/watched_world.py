@@ -25,7 +25,7 @@ def entered(config: Path, ego: str | None = None, settings: tuple[str, ...] = ()
 
 def watched(config: Path, steps: int, speed: float = 0.0, left: float = 0.0) -> list[Moment]:
     """What is seen around an ego that goes on at `speed`, and `left` of it, at its departure and after every step."""
-    return in_child(lambda: _watch(config, steps, speed, left))
+    return in_child(lambda: watch(config, steps, speed, left))
 
 
 def asked(config: Path, steps: int, question: Callable[[Any], Any], speed: float = 0.0, left: float = 0.0) -> Any:
@@ -34,7 +34,7 @@ def asked(config: Path, steps: int, question: Callable[[Any], Any], speed: float
     def job() -> Any:
         import libsumo  # noqa: PLC0415 one simulation a process: never in the tests' own
 
-        _watch(config, steps, speed, left)
+        watch(config, steps, speed, left)
         return question(libsumo)
 
     return in_child(job)
@@ -52,7 +52,8 @@ def _world(config: Path, ego: str | None, settings: tuple[str, ...]) -> tuple[Wo
         return world, world.await_ego(settings, lambda _: True)
 
 
-def _watch(config: Path, steps: int, speed: float, left: float) -> list[Moment]:
+def watch(config: Path, steps: int, speed: float, left: float) -> list[Moment]:
+    """`watched`, in this process."""
     world, entry = _world(config, None, ())
     roadmap = RoadMap.load(load_scenario(config).configuration.net, entry.vehicle_class)
     end = roadmap.lanes[f"{entry.edges[-1]}_0"].length
