@@ -21,9 +21,9 @@ import msgspec
 
 import dvca_sumo
 from dvca_sumo.analysis.attribution import Attribution
-from dvca_sumo.engine.branching import private_memory
 from dvca_sumo.engine.fork import ForkEngine
 from dvca_sumo.engine.processes import Failure, isolated
+from dvca_sumo.engine.thinning import private_memory
 from dvca_sumo.scenario import Scenario, silenced
 
 CASES = [

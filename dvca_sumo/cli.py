@@ -115,6 +115,8 @@ def run(
     """
     if repeats is not None and not jitter:
         raise click.UsageError("--repeats goes with --jitter: in exact mode every run is the same")
+    if output is not None:
+        _make(output)
     terminal = _Terminal(engine, jobs)
     scenario = load_scenario(sumocfg, ego, seed, begin, end)
     drive = api.drive(scenario, faults, stack, (repeats or _REPEATS) if jitter else None, jobs, engine)
@@ -170,9 +172,15 @@ def main() -> NoReturn:
 def _publish(drive: FactualDrive, found: Attribution, timing: Timing, output: Path | None, *, as_json: bool) -> None:
     result = result_of(drive.request.scenario, drive.request.faults, found, timing)
     if output is not None:
-        output.mkdir(parents=True, exist_ok=True)
         _write(output / "result.json", result)
     click.echo(json.dumps(result, indent=1) if as_json else verdict_text(found, timing))
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise click.BadParameter(f"cannot make the folder {folder}: {error.strerror}", param_hint="'-o'") from None
 
 
 def _write(path: Path, result: Json) -> None:

@@ -119,9 +119,32 @@ def explain(
     found = Attribution(record, record.digest, None, verdict, True, doubts, math.inf)
     if not record.violations:
         return replace(found, planted=_planted(request.faults, found))
-    violation = principal(record.violations)
+    found = replace(found, violation=principal(record.violations), verdict=Verdict.UNRESOLVED)
+    asked: list[Dtest] = []
+    try:
+        setting = _setting(request, record, principal(record.violations))
+        asked.append(Dtest(engine, setting, progress.probe))
+        found = replace(found, until=setting.stop.at)
+        for answer in _steps(found, engine, asked[0], request):
+            found = answer
+        if witness is not None:
+            asked.append(Dtest(witness, setting, progress.probe, len(asked[0].probes)))
+            found = _certified(found, asked[1])
+    except KeyboardInterrupt:
+        raise AttributionStoppedError(replace(found, probes=_all_probes(asked), reason="interrupted")) from None
+    return replace(found, probes=_all_probes(asked), planted=_planted(request.faults, found))
+
+
+def attribute(engine: Engine, request: Request, progress: Progress) -> Attribution:
+    """Run a scenario, and explain its violation if there is one; raises what `factual_run` and `explain` do."""
+    record = factual_run(engine, request)
+    progress.factual(record)
+    return explain(engine, request, record, progress)
+
+
+def _setting(request: Request, record: Record, violation: Violation) -> Setting:
     is_mission = violation.category is Category.MISSION
-    setting = Setting(
+    return Setting(
         scenario=request.scenario,
         faults=request.faults,
         futures=recorded_futures(record.moments),
@@ -130,25 +153,10 @@ def explain(
         is_mission=is_mission,
         jitters=_jitters(request),
     )
-    dtest = Dtest(engine, setting, progress.probe)
-    found = replace(found, violation=violation, until=setting.stop.at, verdict=Verdict.UNRESOLVED)
-    try:
-        for answer in _steps(found, engine, dtest, request):
-            found = answer
-        if witness is not None:
-            second = Dtest(witness, setting, progress.probe, len(dtest.probes))
-            found = replace(_certified(found, second), probes=tuple(second.probes))
-    except KeyboardInterrupt:
-        partial = replace(found, probes=tuple(dtest.probes), reason="interrupted")
-        raise AttributionStoppedError(partial) from None
-    return replace(found, probes=(*dtest.probes, *found.probes), planted=_planted(request.faults, found))
 
 
-def attribute(engine: Engine, request: Request, progress: Progress) -> Attribution:
-    """Run a scenario, and explain its violation if there is one; raises what `factual_run` and `explain` do."""
-    record = factual_run(engine, request)
-    progress.factual(record)
-    return explain(engine, request, record, progress)
+def _all_probes(asked: list[Dtest]) -> tuple[Probe, ...]:
+    return tuple(probe for dtest in asked for probe in dtest.probes)
 
 
 def _settled(record: Record, violation: Violation) -> StopRule:

@@ -47,7 +47,7 @@ class Difference(msgspec.Struct, frozen=True):
 def differences(record: Record, message: MessageId, futures: Futures, focus: str | None) -> tuple[Difference, ...]:
     """How a recorded message differs from what its idealized substitute would have said, worst first.
 
-    Of objects, only `focus` (an id) counts, or the one most in the ego's way where there is none.
+    Of objects, `focus` (an id) and the one most in the ego's way count.
 
     Empty for planning, which has no substitute, and for a message that as good as equals the ideal one.
     """
@@ -184,13 +184,14 @@ def _of_command(said: ControlCommand, occasion: Occasion) -> list[Difference]:
 
 
 def _relevant(occasion: Occasion, focus: str | None) -> list[int]:
-    """The one true object that matters: `focus`, else the one most in the ego's way; else all in sensor range."""
+    """Rows of the true objects that matter: `focus` and the one most in the ego's way; all in range without either."""
     objects, ego = occasion.moment.objects, occasion.moment.ego
-    if focus in objects.ids:
-        return [objects.ids.index(focus)]
+    matter = [objects.ids.index(focus)] if focus in objects.ids else []
     first = in_way(occasion)
-    if first is not None:
-        return [first]
+    if first is not None and first not in matter:
+        matter.append(first)
+    if matter:
+        return matter
     gaps = np.hypot(objects.boxes[:, 0] - ego.x, objects.boxes[:, 1] - ego.y)
     return [int(row) for row in np.flatnonzero(gaps < occasion.sensor_range)]
 

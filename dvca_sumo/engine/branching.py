@@ -1,200 +1,214 @@
 """The processes that hold a simulation: stem, checkpoints, branches, passes.
 
 The stem drives the factual run. Before a world step it may fork a *checkpoint*, which parks and waits
-for orders; an order makes it fork a *branch*, which drives on under another task and delivers what came
-of it. With ideal predictions the branch stays where it is and forks a *pass* as often as it takes.
-A fork copies everything, SUMO, stack, oracles and record, so a branch is bit for bit what a run from
-time 0 would have become.
+for orders; an order makes it fork a *branch*, which drives on under another task, delivers what came
+of it, and ends. With ideal predictions the branch stays where it is and forks a *pass* as often as it
+takes. A fork copies everything, SUMO, stack, oracles and record, so a branch is bit for bit what a run
+from time 0 would have become.
 
 Rules of this file: no thread; a child makes its descriptors its own before its parent goes on; every
-process but the stem ends by `os._exit`; a parked process ends when the analysis closes its connection,
-a driving one when the process that forked it ends.
+process ends by `os._exit`, so that it never cleans up what others still use; a parked process ends
+when the analysis closes its connection, a driving one when the process that forked it ends.
 """
 
+import contextlib
 import gc
 import os
-import resource
 import signal
+import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable
-from multiprocessing.connection import Client, Connection, Pipe
+from functools import partial
+from multiprocessing.connection import Client, Connection, Pipe, wait
 from pathlib import Path
-from typing import NoReturn
-
-import msgspec
+from typing import NamedTuple, NoReturn
 
 from dvca_sumo.engine.descriptors import make_own
+from dvca_sumo.engine.orders import Delivered, Died, Driven, Order, Parked, Started
 from dvca_sumo.engine.passes import Pass, predicts_ideally, settled, summary
-from dvca_sumo.engine.processes import Failure, die_with, said_in, sendable
+from dvca_sumo.engine.processes import Failure, adopt_orphans, death, die_with, print_to_descriptors, raised_here
 from dvca_sumo.engine.protocol import Glimpse
+from dvca_sumo.engine.thinning import Kept
 from dvca_sumo.record import Record
-from dvca_sumo.run import RoadMapOf, Task, departed
+from dvca_sumo.run import RoadMapOf, Simulation, Task, departed
 from dvca_sumo.stack.reference import StackFactory
 
+if sys.platform != "win32":
+    import resource
+
 SPACING = 100  # world steps between the stem's checkpoints: what forking costs stays below a tenth of the run
-MEMORY_BUDGET = 1 << 30  # [bytes] of the stem's checkpoints together
-_KEPT_OF_AN_AGE = 2  # checkpoints for each doubling of the age
+STEM_LOG = "stem"
+_PARKED_LOG = "parked"
+_READY = b"."
+_LONGEST_REASON = 4096  # [bytes] a pipe takes so many at once
 
 
-class Parked(msgspec.Struct, frozen=True):
-    """A checkpoint says that it is there."""
+class _Child(NamedTuple):
+    """A process that was forked here."""
 
-    step: int  # world steps driven
     process: int
-
-
-class Started(msgspec.Struct, frozen=True):
-    """A branch says that it is under way."""
-
-    order: int
-    process: int
-
-
-class Delivered(msgspec.Struct, frozen=True):
-    """What came of the stem (order None) or of a branch."""
-
-    order: int | None
-    answer: Record | Glimpse | Failure
-    log: str
-
-
-class Order(msgspec.Struct, frozen=True):
-    """Branch off, under `task`; leave checkpoints at `steps` on the way."""
-
-    number: int
-    task: Task
-    steps: tuple[int, ...]
-
-
-class _DriveOn(BaseException):
-    """Unwinds a freshly forked pass to the loop that drives."""
+    sign: int  # descriptor that can be read once the process has ended
 
 
 class Holder:
     """The process that holds a simulation, in whichever role it is."""
 
-    def __init__(self, address: str, folder: Path) -> None:
-        """A stem that reports to the socket `address`; logs go to `folder`."""
+    _simulation: Simulation
+    _task: Task
+
+    def __init__(self, address: str, folder: Path, connection: Connection) -> None:
+        """A stem that answers through `connection`; those forked from it call the socket `address`.
+
+        All write what they have to say into files in `folder`: the stem into `STEM_LOG`, a branch into
+        one named after the number of its order.
+        """
         self._address = address
         self._folder = folder
+        self._connection = connection
+        self._log = folder / STEM_LOG
+        self._held: int | None = None  # open as long as this process lives: its parent sees its end by it
         self._is_stem = True
-        self._wanted: frozenset[int] = frozenset()
-        self._children: dict[int, int] = {}  # step -> process of the stem's checkpoints
-        self._killed: list[int] = []  # those it has dropped, until they are gone: their end takes a while
-        self._deliver: Callable[[Record | Failure], None] = self._deliver_factual
+        self._wanted: frozenset[int] = frozenset()  # world steps at which a branch leaves checkpoints
+        self._kept = Kept()
+        self._copied = 0  # [bytes] up to the last checkpoint that this process left
+        self._obstacle = ""
+        self._deliver: Callable[[Record | Failure], NoReturn] = self._deliver_factual
         self._begin, self._since = 0.0, 0.0
-        self._task: Task | None = None
 
-    def hold(self, parent: int, task: Task, roadmap_of: RoadMapOf, factory: StackFactory) -> None:
-        """Drive the factual run in this process, a child of `parent`, and stay until the analysis has enough."""
+    def hold(self, task: Task, roadmap_of: RoadMapOf, factory: StackFactory) -> NoReturn:
+        """Drive the factual run in this process, and stay until the analysis has enough."""
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt ends
-        die_with(parent)
+        adopt_orphans()
         make_own(self._log)
-        self._task = task
-        self._connection = Client(self._address, "AF_UNIX")
+        print_to_descriptors()
+        tempfile.tempdir = str(self._folder)  # the run's own folder goes with it, however this process ends
         try:
-            with departed(task, roadmap_of, factory) as simulation:
-                self._simulation = simulation
-                try:
-                    answer: Record | Failure = simulation.proceed(self._at_step)
-                except Exception as error:  # noqa: BLE001 - whatever a run raises is its answer
-                    answer = Failure(f"{type(error).__name__}: {error}", "", sendable(error))
-                self._deliver(answer)
-        except Exception as error:  # noqa: BLE001
-            self._deliver_factual(Failure(f"{type(error).__name__}: {error}", "", sendable(error)))
+            with departed(task, roadmap_of, factory) as self._simulation:
+                self._copied = _copied_here()
+                self._drive_on()
+        except BaseException as error:  # noqa: BLE001 - whatever a run raises is its answer, SystemExit included
+            self._deliver(raised_here(error))
 
-    def _deliver_factual(self, answer: Record | Failure) -> None:
-        self._send(self._connection, None, answer)
+    def _drive_on(self) -> NoReturn:
         try:
-            self._connection.recv()  # nothing is ever sent: this waits for the end
-        except EOFError:
-            for process in self._children.values():
-                os.kill(process, signal.SIGKILL)
+            try:
+                answer: Record | Failure = self._simulation.proceed(self._at_step)
+            except BaseException as error:  # noqa: BLE001 - as above
+                answer = raised_here(error)
+            self._deliver(answer)
+        except BaseException as error:  # noqa: BLE001 - nobody listens any more
+            raised_here(error)
+        finally:
+            os._exit(1)
+
+    def _deliver_factual(self, answer: Record | Failure) -> NoReturn:
+        self._connection.send(Driven(answer, self._obstacle))
+        with contextlib.suppress(EOFError):
+            self._connection.recv()  # whatever it is: the end
+        with contextlib.suppress(ChildProcessError):
+            while True:  # they end as this process does; it is the last, and leaves none unburied
+                os.wait()
+        os._exit(0)
 
     def _at_step(self) -> None:
         step = self._simulation.drive.steps
-        is_due = step % SPACING == 0 if self._is_stem else step in self._wanted
-        if is_due and _is_forkable():
+        if step % SPACING == 0 if self._is_stem else step in self._wanted:
             self._leave_checkpoint(step)
 
     def _leave_checkpoint(self, step: int) -> None:
         gc.freeze()  # the collector would touch, and so copy, every page of what is here already
-        child = self._forked(f"checkpoint-{step}")
-        if child == 0:
-            self._serve(step)
-        elif self._is_stem:
-            self._children[step] = child
-            self._thin(step)
-
-    def _thin(self, now: int) -> None:
-        """Keep the start, and a few checkpoints for each doubling of the age; fewer if memory runs out."""
-        counts: dict[int, int] = {}
-        for step in sorted(self._children, reverse=True):
-            age = ((now - step) // SPACING).bit_length()
-            counts[age] = counts.get(age, 0) + 1
-            if step > 0 and counts[age] > _KEPT_OF_AN_AGE:
-                self._drop(step)
-        # What checkpoints hold alone is at most what was copied since the first: only past that is it worth measuring.
-        if resource.getrusage(resource.RUSAGE_SELF).ru_minflt * resource.getpagesize() < MEMORY_BUDGET:
+        copied, self._copied = _copied_here() - self._copied, _copied_here()
+        try:
+            child = self._forked(_PARKED_LOG, partial(self._park, step, copied))
+        except NotForkedError as error:
+            self._obstacle = str(error)
             return
-        while len(self._children) > 2 and sum(map(private_memory, self._children.values())) > MEMORY_BUDGET:
-            self._drop(sorted(self._children)[1])
+        if child is None:
+            self._obey(self._awaited())
+            return
+        os.close(child.sign)
+        if self._is_stem:
+            self._kept.add(step // SPACING, child.process, copied)
 
-    def _drop(self, step: int) -> None:
-        process = self._children.pop(step)
-        os.kill(process, signal.SIGKILL)
-        self._killed.append(process)
-        self._killed = [one for one in self._killed if os.waitpid(one, os.WNOHANG)[0] == 0]
-
-    def _serve(self, step: int) -> None:
-        """Wait for orders. Returns in a branch or a pass only, which then drives on."""
-        signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for branches
+    def _park(self, step: int, copied: int) -> None:
         self._is_stem = False
         self._connection.close()  # the other end must see when its owner dies
         self._connection = Client(self._address, "AF_UNIX")
-        self._connection.send(Parked(step, os.getpid()))
-        while True:
-            try:
-                order: Order = self._connection.recv()
-            except (EOFError, OSError):
-                os._exit(0)
-            if self._forked(f"branch-{order.number}", mortal=True) == 0:
-                self._connection.close()
-                signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-                self._branch(order)
-                return
+        self._connection.send(Parked(step, os.getpid(), copied))
 
-    def _branch(self, order: Order) -> None:
-        self._connection = connection = Client(self._address, "AF_UNIX")
-        connection.send(Started(order.number, os.getpid()))
+    def _awaited(self) -> Order:
+        """Fork a branch for every order, and tell of those that die. Returns in a branch only: its order."""
+        branches: dict[int, tuple[int, int]] = {}  # sign -> order, process
+        try:
+            while True:
+                for ready in wait([self._connection, *branches]):
+                    if isinstance(ready, int):
+                        self._bury(ready, *branches.pop(ready))
+                        continue
+                    order: Order | None = self._connection.recv()
+                    if order is None:
+                        os._exit(0)
+                    if self._has_become_branch(order, branches):
+                        return order
+        except BaseException:  # noqa: BLE001 - the analysis is gone
+            os._exit(1)
+
+    def _has_become_branch(self, order: Order, branches: dict[int, tuple[int, int]]) -> bool:
+        try:
+            child = self._forked(str(order.number), self._connection.close, mortal=True)
+        except NotForkedError as error:
+            self._connection.send(Died(order.number, str(error)))
+            return False
+        if child is None:
+            return True
+        branches[child.sign] = (order.number, child.process)
+        self._connection.send(Started(order.number, child.process))
+        return False
+
+    def _bury(self, sign: int, order: int, process: int) -> None:
+        os.close(sign)
+        code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+        if code != 0:
+            self._connection.send(Died(order, death(code)))
+
+    def _obey(self, order: Order) -> None:
+        """Become the branch that `order` asks for. Returns to drive on."""
+        self._copied = 0  # the system counts anew for a new process
+        self._deliver = lambda answer: self._report(order.number, self._glimpse(answer))
         if not predicts_ideally(order.task):
             self._wanted = frozenset(order.steps)
             self._start(order.task)
-            self._deliver = lambda answer: self._end(connection, order.number, self._glimpse(answer))
             return
         self._wanted = frozenset()
         try:
-            answer: Glimpse | Failure = settled(order.task, self._forked_pass)
+            answer: Glimpse | Failure = settled(order.task, self._passed)
         except _DriveOn:
             return
-        except EOFError:
-            answer = Failure("a pass died without an answer", said_in(Path(self._log)))
         except _PassFailedError as failed:
             answer = failed.failure
-        self._end(connection, order.number, answer)
+        self._report(order.number, answer)
 
-    def _forked_pass(self, task: Task) -> Pass:
+    def _passed(self, task: Task) -> Pass:
+        """One pass, driven by a child. Raises `_DriveOn` there."""
         receiver, sender = Pipe(duplex=False)
-        if self._forked("pass", mortal=True) == 0:
-            receiver.close()
+        try:
+            child = self._forked(self._log.name, receiver.close, mortal=True)
+        except NotForkedError as error:
+            raise _PassFailedError(Failure(str(error), "")) from None
+        if child is None:
             self._start(task)
-            self._deliver = lambda answer: self._end_pass(sender, answer)
+            self._deliver = lambda answer: self._deliver_pass(sender, answer)
             raise _DriveOn
         sender.close()
-        answer: Pass | Failure = receiver.recv()
-        if isinstance(answer, Failure):
-            raise _PassFailedError(answer)
+        os.close(child.sign)
+        answer: Pass | Failure | None = None
+        with contextlib.suppress(EOFError, OSError):  # the latter when it died in the middle of its answer
+            answer = receiver.recv()
+        code = os.waitstatus_to_exitcode(os.waitpid(child.process, 0)[1])
+        if answer is None or isinstance(answer, Failure):
+            raise _PassFailedError(answer or Failure(death(code), ""))
         return answer
 
     def _start(self, task: Task) -> None:
@@ -203,48 +217,74 @@ class Holder:
         self._simulation.drive.branch(task)
 
     def _summary(self, record: Record) -> Pass:
-        assert self._task is not None  # set before anything is driven
         return summary(self._task, record, record.simulated - self._since, time.perf_counter() - self._begin)
 
     def _glimpse(self, answer: Record | Failure) -> Glimpse | Failure:
         return answer if isinstance(answer, Failure) else self._summary(answer).glimpse
 
-    def _end(self, connection: Connection, order: int, answer: Glimpse | Failure) -> NoReturn:
-        self._send(connection, order, answer)
+    def _report(self, order: int, answer: Glimpse | Failure) -> NoReturn:
+        with Client(self._address, "AF_UNIX") as connection:
+            connection.send(Delivered(order, answer))
         os._exit(0)
 
-    def _end_pass(self, sender: Connection, answer: Record | Failure) -> NoReturn:
+    def _deliver_pass(self, sender: Connection, answer: Record | Failure) -> NoReturn:
         sender.send(answer if isinstance(answer, Failure) else self._summary(answer))
         os._exit(0)
 
-    def _send(self, connection: Connection, order: int | None, answer: Record | Glimpse | Failure) -> None:
-        connection.send(Delivered(order, answer, self._log))
+    def _forked(self, log: str, introduce: Callable[[], None], *, mortal: bool = False) -> _Child | None:
+        """Fork; returns the child, and in it None.
 
-    @property
-    def _log(self) -> str:
-        return str(self._folder / str(os.getpid()))
+        By then the child has made its descriptors its own, and done what `introduce` asks. A `mortal`
+        child ends with its parent; a checkpoint outlives the branch that left it.
 
-    def _forked(self, role: str, *, mortal: bool = False) -> int:
-        """Fork; returns 0 in the child, whose descriptors are its own, and its process id in the parent.
-
-        A `mortal` child ends with its parent; a checkpoint outlives the branch that left it.
+        Raises:
+            NotForkedError: There is no child.
         """
+        if (threads := thread_count()) > 1:
+            raise NotForkedError(f"it runs {threads} threads, of which a copy of the process would have one")
+        sign, held = os.pipe()
         parent = os.getpid()
-        receiver, sender = os.pipe()
-        child = os.fork()
-        if child:
-            os.close(sender)
-            os.read(receiver, 1)  # nothing may be read from a shared file before the child has its own
-            os.close(receiver)
-            return child
-        os.close(receiver)
-        if mortal:
-            die_with(parent)
-        make_own(self._log)
-        os.write(2, f"{role} of {parent}\n".encode())
-        os.write(sender, b".")
-        os.close(sender)
-        return 0
+        try:
+            process = os.fork()
+        except OSError as error:
+            os.close(sign)
+            os.close(held)
+            raise NotForkedError(f"the system forks no process: {error.strerror}") from None
+        if process == 0:
+            os.close(sign)
+            self._settle_in(held, log, introduce, parent if mortal else None)
+            return None
+        os.close(held)
+        said = os.read(sign, _LONGEST_REASON)  # nothing may be read from a shared file before the child has its own
+        if said == _READY:
+            return _Child(process, sign)
+        os.close(sign)
+        os.waitpid(process, 0)
+        raise NotForkedError(f"a copy of the process cannot be set up: {said.decode() or 'it died'}")
+
+    def _settle_in(self, held: int, log: str, introduce: Callable[[], None], parent: int | None) -> None:
+        try:
+            if self._held is not None:
+                os.close(self._held)
+            self._held = held
+            self._log = self._folder / log
+            if parent is not None:
+                die_with(parent)
+            make_own(self._log)
+            introduce()
+            os.write(held, _READY)
+        except BaseException as error:  # noqa: BLE001 - the parent tells of it
+            with contextlib.suppress(OSError):
+                os.write(held, raised_here(error).reason.encode()[:_LONGEST_REASON])
+            os._exit(1)
+
+
+class NotForkedError(Exception):
+    """This process cannot be copied, and why."""
+
+
+class _DriveOn(BaseException):
+    """Unwinds a freshly forked pass to the loop that drives."""
 
 
 class _PassFailedError(Exception):
@@ -255,20 +295,12 @@ class _PassFailedError(Exception):
         self.failure = failure
 
 
-def private_memory(process: int) -> int:
-    """Pages that belong to a process alone [bytes]; 0 where the system does not tell."""
-    try:
-        lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
-    except OSError:
-        return 0
-    return sum(1024 * int(line.split()[1]) for line in lines if line.startswith("Private_"))
-
-
-def _is_forkable() -> bool:
-    return thread_count() == 1
-
-
 def thread_count() -> int:
     """Threads of this process, a stack's own included."""
     tasks = Path("/proc/self/task")
     return len(list(tasks.iterdir())) if tasks.is_dir() else threading.active_count()
+
+
+def _copied_here() -> int:
+    """Memory [bytes] that this process has made its own since it was forked."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt * resource.getpagesize()

@@ -5,38 +5,46 @@ descriptor steal each other's vehicles. What is written by one appears in the ot
 """
 
 import contextlib
-import fcntl
 import os
 import stat
+import sys
 from pathlib import Path
+
+if sys.platform != "win32":
+    import fcntl
 
 _PROC = Path("/proc/self/fd")  # Linux
 _FOLDER = _PROC if _PROC.is_dir() else Path("/dev/fd")
 _F_GETPATH = 50  # sys/fcntl.h of macOS
 
 
-def make_own(log: str) -> None:
+def make_own(log: Path) -> None:
     """Give this process offsets of its own.
 
     Regular files open for reading are opened anew at the same offset, those open for writing are
     pointed to the null device, and standard output and error to `log`.
+
+    Raises:
+        OSError: A file cannot be opened again.
     """
-    descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    said = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     null = os.open(os.devnull, os.O_WRONLY)
-    kept = {descriptor, null}
-    for number in [int(entry.name) for entry in _FOLDER.iterdir()]:
-        if number > 2 and number not in kept:
-            with contextlib.suppress(OSError):  # the listing's own descriptor is closed by now
-                _own(number, null)
-    os.dup2(descriptor, 1)
-    os.dup2(descriptor, 2)
-    os.close(descriptor)
+    for number in map(int, os.listdir(_FOLDER)):  # noqa: PTH208 - the listing's own descriptor is closed by now
+        if number > 2 and number != said and _is_regular(number):
+            _own(number, null)
+    os.dup2(said, 1)
+    os.dup2(said, 2)
+    os.close(said)
     os.close(null)
 
 
+def _is_regular(number: int) -> bool:
+    with contextlib.suppress(OSError):  # not open any more
+        return stat.S_ISREG(os.fstat(number).st_mode)
+    return False
+
+
 def _own(number: int, null: int) -> None:
-    if not stat.S_ISREG(os.fstat(number).st_mode):
-        return
     if fcntl.fcntl(number, fcntl.F_GETFL) & os.O_ACCMODE != os.O_RDONLY:
         os.dup2(null, number)
         return

@@ -28,7 +28,7 @@ else:
 
 Result = TypeVar("Result")
 
-_PR_SET_PDEATHSIG = 1  # linux/prctl.h
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 _SAID_LINES = 60  # of standard error that a failure keeps: SUMO's words stand before a traceback
 
 
@@ -58,7 +58,7 @@ class _Child(Generic[Result]):
             answer: Result | Failure = self.receiver.recv()
         except (EOFError, OSError):  # the latter when it died in the middle of its answer
             self.process.join()
-            return Failure(_death(self.process.exitcode), said_in(self.log))
+            return Failure(death(self.process.exitcode), said_in(self.log))
         self.process.join()
         if isinstance(answer, Failure):
             return Failure(answer.reason, said_in(self.log), answer.error)
@@ -103,22 +103,32 @@ def isolated(
 def _work(job: Callable[[], object], sender: Connection, log: Path, parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt ends
     die_with(parent)
+    tempfile.tempdir = str(log.parent)  # so that nothing outlives a killed child
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
-    # Python's own streams may be others (a notebook's, a test runner's). By the line: a crash flushes nothing.
-    sys.stdout = sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)
+    print_to_descriptors()
     try:
         answer = job()
     except Exception as error:  # noqa: BLE001 - whatever a job raises is its answer
-        os.write(2, traceback.format_exc().encode())
-        answer = Failure(f"{type(error).__name__}: {error}", "", sendable(error))
+        answer = raised_here(error)
     sender.send(answer)
     sender.close()
     os._exit(0)  # SUMO's and the test runner's exit handlers are not this process's business
 
 
-def sendable(error: Exception) -> Exception | None:
+def print_to_descriptors() -> None:
+    """Let Python print where SUMO does: its own streams may be others (a notebook's, a test runner's)."""
+    sys.stdout = sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)  # by the line: a crash flushes nothing
+
+
+def raised_here(error: BaseException) -> Failure:
+    """What to answer when `error` is being handled; its traceback goes to standard error."""
+    os.write(2, traceback.format_exc().encode())
+    return Failure(f"{type(error).__name__}: {error}", "", _sendable(error) if isinstance(error, Exception) else None)
+
+
+def _sendable(error: Exception) -> Exception | None:
     """The bare error, or None where it does not survive the way to another process."""
     error.__traceback__ = error.__cause__ = error.__context__ = None
     try:
@@ -136,7 +146,14 @@ def die_with(parent: int) -> None:
             os._exit(1)
 
 
-def _death(code: int | None) -> str:
+def adopt_orphans() -> None:
+    """Become the parent of what this process's descendants leave behind, which is init's business else (Linux only)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
+
+
+def death(code: int | None) -> str:
+    """How a process with this exit code ended, in words."""
     if code is not None and code < 0:
         return f"the process died of {signal.Signals(-code).name}"
     return f"the process ended with code {code} without an answer"

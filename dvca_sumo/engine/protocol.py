@@ -30,7 +30,8 @@ class Glimpse(msgspec.Struct, frozen=True):
 class Engine(Protocol):
     """Runs tasks in processes of their own."""
 
-    name: str
+    name: str  # of the engine that does the work
+    fallback: str | None  # why that is not the one that was asked for; None: it is
     roadmap: RoadMap
 
     @property

@@ -21,6 +21,7 @@ class ReplayEngine:
     """Re-runs from time 0: slow, and the witness that every other engine is held against."""
 
     name = "replay"
+    fallback: str | None = None
 
     def __init__(self, net: Path, stack: str | None, jobs: int, timeout: float = DEFAULT_TIMEOUT) -> None:
         """An engine for scenarios on one net, with one stack (`--stack`'s word).

@@ -143,7 +143,8 @@ def _cost(found: Attribution, timing: Timing) -> str:
         return f"\n1 run, {timing.factual_wall_s:.1f} s"
     settled = f", safe means: none until {found.until:.1f} s" if math.isfinite(found.until) else ""
     total = timing.factual_wall_s + timing.attribution_wall_s
-    return f"\n1 + {probes} runs, {total:.1f} s with {timing.jobs} jobs, engine {timing.engine}{settled}"
+    jobs = "1 job" if timing.jobs == 1 else f"{timing.jobs} jobs"
+    return f"\n1 + {probes} runs, {total:.1f} s with {jobs}, engine {timing.engine}{settled}"
 
 
 def _outcome(probe: Probe) -> str:

@@ -3,6 +3,8 @@
 import math
 from typing import NamedTuple, TypeVar
 
+import numpy as np
+
 from dvca_sumo.geometry.randomness import uniforms
 from dvca_sumo.interventions import Fault, Gate, Intervention, Occasion, state_of
 from dvca_sumo.interventions.effects import EFFECTS
@@ -144,10 +146,10 @@ class Drive:
     def record(self, simulated: float) -> Record:
         """What the drive left, `simulated` [s] of SUMO time having passed."""
         ending = self._ending or Ending.CUT
-        judgements = tuple(oracle.conclude(ending) for oracle in self._oracles)
+        is_whole = math.isinf(self._contact)  # after a contact nothing was judged
+        judgements = tuple(oracle.conclude(ending if is_whole else Ending.CUT) for oracle in self._oracles)
         known = {id(violation) for violation in self._violations}
-        late = [one for judged in judgements for one in judged.violations if id(one) not in known]
-        self._violations.extend(one for one in late if one.time <= self._contact)
+        self._violations.extend(one for judged in judgements for one in judged.violations if id(one) not in known)
         return Record(
             ego=self.ego.name,
             route=self.ego.route,
@@ -243,7 +245,10 @@ class Drive:
         if channels.localization is None or channels.prediction is None or channels.perception is None:
             return None
         signals = channels.perception.signals
-        return _checked(self._stack.planning.step(channels.localization, channels.prediction, signals), Trajectory)
+        plan = _checked(self._stack.planning.step(channels.localization, channels.prediction, signals), Trajectory)
+        if not np.isfinite(plan.points).all():
+            raise ValueError("its trajectory holds a number that is not finite")
+        return plan
 
     def _control(self, moment: Moment) -> Message | None:  # noqa: ARG002
         believed = self._channels.localization

@@ -14,7 +14,9 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.angles import wrapped
-from dvca_sumo.messages import HEADING, ControlCommand, LocalizationEstimate, T, Trajectory, VehicleShape, X, Y
+from dvca_sumo.messages import HEADING, ControlCommand, LocalizationEstimate, Trajectory, VehicleShape, X, Y
+
+_SQRT2 = math.sqrt(2.0)
 
 
 class ControlConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -41,7 +43,8 @@ class ControlConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     stop_braking: float = 3.0  # [m/s^2] when there is nothing (any more) to follow
 
 
-Row = tuple[float, float, float, float, float, float]  # x, y, heading (unwrapped), speed, acceleration, curvature
+Pose = tuple[float, float, float]  # x, y, heading (unwrapped)
+Place = tuple[int, float]  # row of a trajectory, and how far on to the next one, in [0, 1]
 
 
 class _Track:
@@ -49,44 +52,35 @@ class _Track:
 
     def __init__(self, trajectory: Trajectory) -> None:
         points = trajectory.points
-        columns = points[:, X:].copy()
-        turns = np.rint(np.diff(points[:, HEADING]) / (2.0 * math.pi))
-        columns[1:, HEADING - X] -= 2.0 * math.pi * np.cumsum(turns)  # np.unwrap, five times as fast
-        steps = np.hypot(np.diff(points[:, X]), np.diff(points[:, Y]))
+        steps = points[1:] - points[:-1]
+        headings = points[:, HEADING].copy()
+        headings[1:] -= 2.0 * math.pi * np.rint(steps[:, HEADING] / (2.0 * math.pi)).cumsum()  # np.unwrap, but fast
         self.source = trajectory
         self.is_finite = bool(np.isfinite(points).all())
-        self.times: list[float] = points[:, T].tolist()
-        self._stations: list[float] = [0.0, *np.cumsum(steps).tolist()]
-        self._rows: list[Row] = list(map(tuple, columns.tolist()))
+        self.times, x, y, _, self.speeds, self.accelerations, self.curvatures = points.T.tolist()
+        self._poses: list[Pose] = list(zip(x, y, headings.tolist(), strict=True))
+        self.stations: list[float] = [0.0, *np.hypot(steps[:, X], steps[:, Y]).cumsum().tolist()]
 
-    def at_time(self, time: float) -> tuple[Row, float]:
-        """The row at `time` [s] after the trajectory was made, and its station [m]."""
-        i, share = _place(self.times, time)
-        return self._row(i, share), (1.0 - share) * self._stations[i] + share * self._stations[i + 1]
-
-    def at_station(self, station: float) -> Row:
-        """The row at `station` [m] along the trajectory."""
-        return self._row(*_place(self._stations, station))
-
-    def _row(self, i: int, share: float) -> Row:
-        x, y, heading, speed, acceleration, curvature = self._rows[i]
-        x1, y1, heading1, speed1, acceleration1, curvature1 = self._rows[i + 1]
-        return (
-            x + share * (x1 - x),
-            y + share * (y1 - y),
-            heading + share * (heading1 - heading),
-            speed + share * (speed1 - speed),
-            acceleration + share * (acceleration1 - acceleration),
-            curvature + share * (curvature1 - curvature),
-        )
+    def pose(self, place: Place) -> Pose:
+        """The pose at `place`."""
+        i, share = place
+        x, y, heading = self._poses[i]
+        x1, y1, heading1 = self._poses[i + 1]
+        return x + share * (x1 - x), y + share * (y1 - y), heading + share * (heading1 - heading)
 
 
-def _place(knots: list[float], value: float) -> tuple[int, float]:
-    """The interval of ascending `knots` that holds `value`, and how far through it lies, in [0, 1]."""
-    i = min(max(bisect_right(knots, value) - 1, 0), len(knots) - 2)
+def _place(knots: list[float], value: float) -> Place:
+    """Where `value` lies among ascending `knots`."""
+    i = bisect_right(knots, value, 1, len(knots) - 1) - 1
     width = knots[i + 1] - knots[i]
     share = (value - knots[i]) / width if width > 0.0 else 1.0
     return i, min(max(share, 0.0), 1.0)
+
+
+def _at(place: Place, values: list[float]) -> float:
+    """What lies at `place`, one of `values` being given for each row."""
+    i, share = place
+    return values[i] + share * (values[i + 1] - values[i])
 
 
 class TrackingController:
@@ -116,14 +110,14 @@ class TrackingController:
         track, age = self._track, now - trajectory.time
         if age > track.times[-1] or not track.is_finite:
             return self._stop(now)
-        wanted, station = track.at_time(age)
-        ahead = _along(wanted, localization)  # [m] the ego is past where it should be by now
+        wanted = _place(track.times, age)
+        ahead = _along(track.pose(wanted), localization)  # [m] the ego is past where it should be by now
         # One Newton step corrects the first guess, which is off where a large error meets a bend.
-        reached = station + ahead
-        reached += _along(track.at_station(reached), localization)
+        reached = _at(wanted, track.stations) + ahead
+        reached += _along(track.pose(_place(track.stations, reached)), localization)
         return ControlCommand(
             time=now,
-            acceleration=self._acceleration(localization.speed, wanted[3], -ahead, track, age),
+            acceleration=self._acceleration(localization.speed, _at(wanted, track.speeds), -ahead, track, age),
             steering=self._steering(localization, track, reached),
         )
 
@@ -133,30 +127,30 @@ class TrackingController:
 
     def _steering(self, localization: LocalizationEstimate, track: _Track, station: float) -> float:
         config, speed = self._config, localization.speed
-        x, y, heading, _, _, _ = track.at_station(station)
+        x, y, heading = track.pose(_place(track.stations, station))
         dx, dy = localization.x - x, localization.y - y
         offset = math.cos(heading) * dy - math.sin(heading) * dx
         error = wrapped(localization.heading - heading)
         distance = max(config.min_settling_distance, speed * config.settling_time)
         # Regulated to the heading at which offset and heading terms cancel: that one is limited.
-        approach = offset / (math.sqrt(2.0) * distance)
+        approach = offset / (_SQRT2 * distance)
         approach = min(config.max_approach_angle, max(-config.max_approach_angle, approach))
-        ahead = track.at_station(station + speed * config.steering_preview)
-        curvature = ahead[5] - math.sqrt(2.0) / distance * (error + approach)
+        ahead = _place(track.stations, station + speed * config.steering_preview)
+        curvature = _at(ahead, track.curvatures) - _SQRT2 / distance * (error + approach)
         most = config.max_lateral_acceleration / max(1.0, speed * speed)
         steering = math.atan(self._wheelbase * min(most, max(-most, curvature)))
         return min(config.max_steering, max(-config.max_steering, steering))
 
     def _acceleration(self, speed: float, wanted: float, behind: float, track: _Track, age: float) -> float:
         config = self._config
-        soon = track.at_time(age + config.standstill_preview)[0]
-        if max(wanted, soon[3]) <= config.standstill_speed:
+        soon = _place(track.times, age + config.standstill_preview)
+        if max(wanted, _at(soon, track.speeds)) <= config.standstill_speed:
             self._integral = 0.0
             return self._halting(speed, behind)
         error = wanted - speed
         position = min(config.max_position_error, max(-config.max_position_error, behind))
-        ahead = track.at_time(age + config.acceleration_preview)[0]
-        direct = ahead[4] + config.speed_gain * error + config.position_gain * position + self._integral
+        ahead = _at(_place(track.times, age + config.acceleration_preview), track.accelerations)
+        direct = ahead + config.speed_gain * error + config.position_gain * position + self._integral
         limited = min(config.max_acceleration, max(-config.max_braking, direct))
         # Anti-windup: what the actuator cannot give is not asked for more and more.
         if limited == direct:
@@ -175,6 +169,7 @@ class TrackingController:
         return -min(config.max_braking, needed)
 
 
-def _along(row: Row, localization: LocalizationEstimate) -> float:
-    """How far the pose lies ahead of `row`, along its heading [m]."""
-    return math.cos(row[2]) * (localization.x - row[0]) + math.sin(row[2]) * (localization.y - row[1])
+def _along(pose: Pose, localization: LocalizationEstimate) -> float:
+    """How far the ego believes to lie ahead of `pose`, along its heading [m]."""
+    x, y, heading = pose
+    return math.cos(heading) * (localization.x - x) + math.sin(heading) * (localization.y - y)

@@ -35,9 +35,12 @@ from dvca_sumo.messages import (
 )
 
 CONTROL_STEP = 0.01  # [s]
-# A substitute that takes over beside the trajectory closes the gap like a vehicle, on its way, not by a jump.
-_CLOSING = 0.05  # [m] at most for each metre driven
-_CLOSING_TURN = 0.03  # [rad] likewise
+# A substitute that takes over beside the trajectory steers back onto it like a vehicle, not by a jump: a
+# sideways motion would be one that odometry does not sense.
+_CLOSING = 0.1  # [m] lengthwise at most for each metre driven
+_CLOSING_TURN = 0.03  # [rad] likewise, on top of the trajectory's own turn
+_APPROACH = 3.0  # [m] it heads for a point on the trajectory so far ahead ...
+_APPROACH_TIME = 0.5  # [s] ... and so much time
 _LOST_BRAKING = 3.0  # [m/s^2] without any trajectory left to follow
 
 
@@ -94,11 +97,11 @@ def ideal_control(occasion: Occasion) -> ControlCommand:
     there = _row_at(trajectory, time + CONTROL_STEP)
     gap = relative(_pose(here), believed_pose(occasion))
     ahead, left, turn = relative(_pose(there), _pose(here))
-    nearer, turned = _CLOSING * abs(ahead), _CLOSING_TURN * abs(ahead)
+    homing = gap[2] + math.atan2(gap[1], _APPROACH + _APPROACH_TIME * speed)
     step = PoseStep(
-        forward=ahead + _clipped(gap[0], nearer),
-        left=left + _clipped(gap[1], nearer),
-        turn=wrapped(turn) + _clipped(wrapped(gap[2]), turned),
+        forward=ahead + _clipped(gap[0], _CLOSING * abs(ahead)),
+        left=left,
+        turn=wrapped(turn) + _clipped(wrapped(homing), _CLOSING_TURN * abs(ahead)),
         acceleration=float(there[ACCELERATION]),
     )
     curvature = float(there[CURVATURE])

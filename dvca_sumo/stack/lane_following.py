@@ -16,6 +16,8 @@ from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.lane_paths import LanePath, LanePaths, Placements
 
+_NO_FIT = 1e30  # a misfit beyond that of any lane an object fits
+
 
 class LaneMatchConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """When an object counts as following a lane."""
@@ -159,14 +161,15 @@ class LaneFollowing:
     def _shared(self, candidates: Candidates, misfit: Floats, count: int) -> Candidates:
         """Priors times Gaussian likelihood, as probabilities; what does not fit or is unlikely is dropped."""
         owners, priors = candidates.owners, candidates.probabilities
-        best = np.full(count, np.inf)
-        np.minimum.at(best, owners, np.where(priors > 0.0, misfit, np.inf))
-        with np.errstate(invalid="ignore"):
-            weights = np.where(priors > 0.0, priors * np.exp(-0.5 * (misfit - best[owners])), 0.0)
+        misfit = np.where(priors > 0.0, misfit, _NO_FIT)
+        best = np.full(count, _NO_FIT)
+        np.minimum.at(best, owners, misfit)
+        weights = priors * np.exp(-0.5 * (misfit - best[owners]))
         weights /= np.maximum(np.bincount(owners, weights, count), 1e-12)[owners]
         weights[weights < self._config.min_share] = 0.0
         weights /= np.maximum(np.bincount(owners, weights, count), 1e-12)[owners]
-        return candidates._replace(probabilities=weights).chosen(np.flatnonzero(weights))
+        shared, kept = candidates._replace(probabilities=weights), weights.nonzero()[0]
+        return shared if len(kept) == len(weights) else shared.chosen(kept)
 
     def _advance(self, candidates: Candidates, tracks: Sequence[int]) -> None:
         """Moves anchors on to where the likeliest continuation has the object; past junctions to the next lane."""

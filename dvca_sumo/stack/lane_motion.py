@@ -53,13 +53,13 @@ class LaneMotion:
         pace = np.maximum(config.speeding, speeds / limits[:, 0])[:, None]
         profile = np.minimum(free, np.maximum(np.minimum(bends, pace * limits), slowing))
         profile = np.maximum(profile, _CRAWL)
-        times = np.zeros_like(profile)
+        times = np.zeros(profile.shape)
         np.cumsum(2.0 / (profile[:, 1:] + profile[:, :-1]), axis=1, out=times[:, 1:])
         # All rows in one interpolation: each is moved to a stretch of the time axis of its own.
         apart = 2.0 * _LATE * np.arange(len(paths))[:, None]
         wanted = (PREDICTION_TIMES + apart).ravel()
         known = (np.minimum(times, _LATE) + apart).ravel()
-        distances = np.interp(wanted, known, np.tile(metres, len(paths)))
+        distances: Floats = np.interp(wanted, known, np.concatenate([metres] * len(paths)))
         return stations[:, None] + distances.reshape(len(paths), -1)
 
     def settled(
@@ -72,7 +72,8 @@ class LaneMotion:
         config = self._config
         ways = offsets - targets
         durations = np.maximum(config.settling_time, np.abs(ways) / (config.max_slant * np.maximum(speeds, 0.1)))
-        rates = np.clip(lateral_speeds, -config.max_lateral_speed, config.max_lateral_speed)[:, None]
+        most = config.max_lateral_speed
+        rates = np.minimum(np.maximum(lateral_speeds, -most), most)[:, None]
         ways, durations = ways[:, None], durations[:, None]
         share = np.minimum(PREDICTION_TIMES / durations, 1.0)
         left = 1.0 - share

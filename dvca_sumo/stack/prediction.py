@@ -66,9 +66,9 @@ class MapPrediction:
         reaches = self._motion.reach(speeds, trends)
         candidates = self._changes.added(self._on_lanes(tracked, speeds, reaches, elapsed), tracked, reaches)
         candidates, futures, lanes = self._along_lanes(tracked, candidates, speeds, trends)
-        rest = np.flatnonzero(np.bincount(candidates.owners, minlength=len(speeds)) == 0)
+        rest = (np.bincount(candidates.owners, minlength=len(speeds)) == 0).nonzero()[0]
         owners = np.concatenate([candidates.owners, rest])
-        order = np.argsort(owners, kind="stable")
+        order = owners.argsort(kind="stable")
         poses = np.concatenate([futures, self._straight_on(tracked, rest, speeds)])
         lanes += [self._following.lanes_of(track) for track in tracked.ids[rest].tolist()]
         return PredictedObjects(
@@ -90,7 +90,7 @@ class MapPrediction:
                 trend += gain * ((speed - before) / elapsed - trend)
             self._speeds[track] = speed, trend
         trends = np.array([trend for _, trend in self._speeds.values()])
-        believed: Floats = np.clip(trends, -config.max_braking_trend, config.max_trend)
+        believed: Floats = np.minimum(np.maximum(trends, -config.max_braking_trend), config.max_trend)
         return believed
 
     def _on_lanes(self, tracked: TrackedObjects, speeds: Floats, reaches: Floats, elapsed: float) -> Candidates:
@@ -99,7 +99,7 @@ class MapPrediction:
         is_fast = speeds > self._config.direction_speed
         headings = np.where(is_fast, np.arctan2(velocities[:, 1], velocities[:, 0]), tracked.boxes[:, 2])
         self._following.forget_all_but(tracks)
-        wheeled = np.flatnonzero(_is_wheeled(tracked))
+        wheeled = _is_wheeled(tracked).nonzero()[0]
         self._following.find([tracks[row] for row in wheeled.tolist()], points[wheeled], headings[wheeled])
         moving = wheeled[speeds[wheeled] >= self._config.standing_speed]
         return self._following.follow(
@@ -142,8 +142,10 @@ class MapPrediction:
         """Constant velocity (n, t, 3), which is none for a standing vehicle or obstacle."""
         stands = (speeds < self._config.standing_speed) & (tracked.classes != _PERSON)
         velocities = np.where(stands[:, None], 0.0, tracked.velocities)[rows]
-        poses = np.repeat(tracked.boxes[rows, None, :3], len(PREDICTION_TIMES), axis=1)
-        poses[:, :, :2] += PREDICTION_TIMES[:, None] * velocities[:, None, :]
+        boxes, poses = tracked.boxes[rows], np.empty((len(rows), len(PREDICTION_TIMES), 3))
+        for axis in (0, 1):
+            poses[:, :, axis] = boxes[:, axis, None] + velocities[:, axis, None] * PREDICTION_TIMES
+        poses[:, :, 2] = boxes[:, 2, None]
         return poses
 
 

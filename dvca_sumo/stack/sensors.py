@@ -24,6 +24,7 @@ _GNSS_BIAS = key_of("gnss bias")
 _OBJECT_NOISE = key_of("object noise")
 _CHANCES = key_of("misses and confusions")
 
+_CLASSES = len(ObjectClass)
 _BLOCK = 512  # indices whose noise is drawn at once
 
 
@@ -135,7 +136,7 @@ class Sensors:
         miss = config.miss_near + (config.miss_far - config.miss_near) * shares**2
         noise = normals(self._seed, _OBJECT_NOISE, index, keys, 6)
         bearings = np.arctan2(boxes[rows, 1], boxes[rows, 0])
-        order = np.argsort(bearings, kind="stable")
+        order = bearings.argsort(kind="stable")
         order = order[draws[order, 0] >= miss[order]]
         rows, shares, draws, noise, bearings = rows[order], shares[order], draws[order], noise[order], bearings[order]
         directions = bearings + ego.heading
@@ -210,11 +211,11 @@ def visible_rows(boxes: Floats, config: SensorConfig, shape: VehicleShape) -> tu
     Returns:
         Rows of `boxes`, ascending, and for each its distance as a share of the range in its direction.
     """
-    seen = boxes - np.array([shape.centre, 0.0, 0.0, 0.0, 0.0])
+    seen = boxes - (shape.centre, 0.0, 0.0, 0.0, 0.0)
     distances = nearest_distances(seen)
     bearings = np.abs(np.arctan2(seen[:, 1], seen[:, 0]))
     limits = np.where(bearings <= config.far_field_of_view / 2.0, config.far_range, config.range)
-    rows = np.flatnonzero((distances <= limits) & (bearings <= config.field_of_view / 2.0))
+    rows = ((distances <= limits) & (bearings <= config.field_of_view / 2.0)).nonzero()[0]
     rows = rows[visible_shares(seen[rows], config.occluder_width) >= config.visible_share]
     return rows, distances[rows] / limits[rows]
 
@@ -234,5 +235,5 @@ def _noisy_boxes(boxes: Floats, noise: Floats, config: SensorConfig) -> Floats:
 
 def _noisy_classes(classes: Integers, draws: Floats, squares: Floats, config: SensorConfig) -> Integers:
     is_confused = draws[:, 1] < config.confusion_far * squares
-    others = 1 + np.floor(draws[:, 2] * (len(ObjectClass) - 1)).astype(np.int64)
-    return np.where(is_confused, (classes + others) % len(ObjectClass), classes)
+    others = 1 + (draws[:, 2] * (_CLASSES - 1)).astype(np.int64)
+    return np.where(is_confused, (classes + others) % _CLASSES, classes)

@@ -54,6 +54,7 @@ class Tracks:
         self.covariances: Floats = np.zeros((0, 4, 4))
         self.forms: Floats = np.zeros((0, 3))  # heading, length, width
         self.votes: Integers = np.zeros((0, _CLASSES), dtype=np.int64)  # hits by class
+        self.classes: Integers = np.zeros(0, dtype=np.int64)  # what most hits said; a tie goes to the lower class
         self.sweeps: Integers = np.zeros(0, dtype=np.int64)  # since the first hit, that included
         self.last_hits: Floats = np.zeros(0)  # [s]
 
@@ -63,20 +64,11 @@ class Tracks:
         hits: Integers = self.votes.sum(axis=1)
         return hits
 
-    @property
-    def classes(self) -> Integers:
-        """What most detections of each track said, (n,); a tie goes to the lower class."""
-        classes: Integers = self.votes.argmax(axis=1)
-        return classes
-
     def predict(self, dt: float) -> None:
         """Move all tracks on by dt [s]."""
-        transition = np.eye(4)
-        transition[0, 2] = transition[1, 3] = dt
-        noise = np.zeros((4, 4))
-        noise[0, 0] = noise[1, 1] = dt**4 / 4.0
-        noise[0, 2] = noise[2, 0] = noise[1, 3] = noise[3, 1] = dt**3 / 2.0
-        noise[2, 2] = noise[3, 3] = dt**2
+        transition = np.array([[1.0, 0.0, dt, 0.0], [0.0, 1.0, 0.0, dt], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+        a, b, c = dt**4 / 4.0, dt**3 / 2.0, dt**2
+        noise = np.array([[a, 0.0, b, 0.0], [0.0, a, 0.0, b], [b, 0.0, c, 0.0], [0.0, b, 0.0, c]])
         variances = self._accelerations[self.classes] ** 2
         self.means = self.means @ transition.T
         self.covariances = transition @ self.covariances @ transition.T + variances[:, None, None] * noise
@@ -90,7 +82,7 @@ class Tracks:
         votes[rows, found.classes] += 1
         last_hits = self.last_hits.copy()
         last_hits[rows] = time
-        self.votes, self.last_hits = votes, last_hits
+        self.votes, self.classes, self.last_hits = votes, votes.argmax(axis=1), last_hits
         self._update_forms(rows, found, speeds)
         self._update_motion(rows, found, speeds)
 
@@ -147,6 +139,7 @@ class Tracks:
         self.covariances = np.concatenate([self.covariances, covariances])
         self.forms = np.concatenate([self.forms, found.boxes[:, 2:]])
         self.votes = np.concatenate([self.votes, np.eye(_CLASSES, dtype=np.int64)[found.classes]])
+        self.classes = np.concatenate([self.classes, found.classes])
         self.sweeps = np.concatenate([self.sweeps, np.ones(count, dtype=np.int64)])
         self.last_hits = np.concatenate([self.last_hits, np.full(count, time)])
 
@@ -175,5 +168,6 @@ class Tracks:
         self.covariances = self.covariances[flags]
         self.forms = self.forms[flags]
         self.votes = self.votes[flags]
+        self.classes = self.classes[flags]
         self.sweeps = self.sweeps[flags]
         self.last_hits = self.last_hits[flags]

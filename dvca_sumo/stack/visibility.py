@@ -31,7 +31,7 @@ def visible_shares(boxes: Floats, occluder_width: float) -> Floats:
     what is behind it, not what stands in front of its far end.
     """
     count = len(boxes)
-    occluders = np.flatnonzero(np.minimum(boxes[:, 3], boxes[:, 4]) >= occluder_width)
+    occluders = (np.minimum(boxes[:, 3], boxes[:, 4]) >= occluder_width).nonzero()[0]
     if count < 2 or occluders.size == 0:
         return np.ones(count)
     entries = _entries(boxes, _ray_bearings(boxes).ravel())
@@ -40,7 +40,7 @@ def visible_shares(boxes: Floats, occluder_width: float) -> Floats:
     nearest = entries[occluders].min(axis=0)
     # A box is never hidden by itself; an origin inside it has no entry point, and it is seen.
     unhidden = (own <= nearest + 1e-9) | np.isinf(own)
-    shares: Floats = unhidden.reshape(count, RAYS).mean(axis=1)
+    shares: Floats = unhidden.reshape(count, RAYS).sum(axis=1) / RAYS
     return shares
 
 

@@ -192,7 +192,7 @@ class Session:
             tuple(body[0] for body in bodies),
             np.array([body[1] for body in bodies], dtype=np.int64),
             boxes,
-            speeds * np.column_stack([np.cos(boxes[:, 2]), np.sin(boxes[:, 2])]),
+            speeds * np.array([np.cos(boxes[:, 2]), np.sin(boxes[:, 2])]).T,
             tuple(body[3] for body in bodies),
         )
 

@@ -145,6 +145,7 @@ class FakeEngine:
     """Runs nothing; remembers what was asked. Results come in as late ones first."""
 
     name = "replay"
+    fallback: str | None = None
     roadmap = BARE_MAP
 
     def __init__(self, answers: Answers, records: Sequence[Record | Exception] = ()) -> None:

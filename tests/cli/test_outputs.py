@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from command_line import Result, contents, loaded, typed, without_costs
 
 from dvca_sumo.cli import ExitCode
@@ -93,3 +94,11 @@ def test_another_folder_does_not_change_the_answer(tmp_path: Path, scenario: Cal
     results = [typed("run", config, "--json", folder=folder).result for folder in (tmp_path, config.parent)]
     first, second = (json.dumps(without_costs(result)) for result in results)
     assert first == second
+
+
+@pytest.mark.parametrize("engine", ["fork", "replay"])
+def test_no_scratch_file_outlives_a_command(engine: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    words = ("--fault", "planning.path", "--engine", engine)
+    assert typed("run", "nets/cs5.sumocfg", *words, folder=Path(__file__).parent).code == ExitCode.ATTRIBUTED
+    assert list(tmp_path.iterdir()) == []

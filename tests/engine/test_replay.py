@@ -163,6 +163,14 @@ def test_a_detector_on_a_missing_lane_is_named(tmp_path: Path, street: Path) -> 
         driven(scenario_file(tmp_path, street, additional=detector))
 
 
+def test_a_malformed_additional_file_is_named(tmp_path: Path, street: Path) -> None:
+    with pytest.raises(
+        ScenarioError, match=r"unterminated start tag 'poi' In file '.*extra\.add\.xml' At line"
+    ) as refused:
+        driven(scenario_file(tmp_path, street, additional="<poi"))
+    assert "\n" not in str(refused.value)
+
+
 @pytest.mark.parametrize("text", ["", "<net><edge", "<routes/>", '<net version="1.20"></net>'])
 def test_a_net_that_is_none_is_refused_in_one_line(tmp_path: Path, text: str) -> None:
     net = tmp_path / "broken.net.xml"

@@ -53,6 +53,15 @@ def test_what_follows_a_contact_is_recorded_but_not_judged(tmp_path: Path, stree
     assert max(one.time for one in record.violations) <= short.moments[-1].time
 
 
+def test_what_is_concluded_at_the_end_does_not_count_after_a_contact(tmp_path: Path, street: Path) -> None:
+    config = scenario_file(tmp_path, street, SLOW_EGO + STOPPED, end="8")
+    record = driven(config, stack="small_stacks:full_throttle", stop=StopRule(after_contact=60.0))
+    assert record.ending is Ending.TIME_OVER
+    assert record.moments[-1].time == pytest.approx(8.0)
+    assert {one.kind for one in record.violations} == {"ttc", "collision"}
+    assert {one.kind: one.answer for one in record.judgements}["destination"] is Answer.UNKNOWN
+
+
 def test_without_anything_in_the_way_the_same_drive_is_too_fast(tmp_path: Path, street: Path) -> None:
     record = driven(
         scenario_file(tmp_path, street, SLOW_EGO), stack="small_stacks:full_throttle", stop=StopRule(at=9.0)

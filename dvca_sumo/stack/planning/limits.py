@@ -91,20 +91,23 @@ def _at_line(distance: float, label: str, config: PlanningConfig) -> Stop:
 
 def _obstacle(scene: Scene, graph: Graph, front: float) -> int | None:
     """The nearest future that stands in the way, as a row; not one that the front bumper has cleared already."""
-    rows = np.arange(scene.moving, len(scene.owners))
-    standing = graph.occupied[rows, 0] & ((graph.low[rows, 0] > front) | (graph.gaps[rows, 0] < 0.0))
-    rows = rows[standing]
-    return int(rows[graph.low[rows, 0].argmin()]) if len(rows) else None
+    still = slice(scene.moving, None)
+    low = graph.low[still, 0]
+    in_way = graph.occupied[still, 0] & ((low > front) | (graph.gaps[still, 0] < 0.0))
+    return scene.moving + int(np.where(in_way, low, np.inf).argmin()) if in_way.any() else None
 
 
 def _passing_speeds(scene: Scene, graph: Graph, config: PlanningConfig) -> list[tuple[int, float]]:
     """Futures that are passed close by now, as rows, and at which speed [m/s]."""
-    owners, gaps = scene.owners, graph.gaps[:, 0]
-    is_person = scene.classes[owners] == _PERSON
-    close = (gaps >= 0.0) & (gaps < np.where(is_person, config.person_slow_gap, config.object_slow_gap))
-    close &= scene.is_standing[owners] | ((scene.speeds[owners] < _SLOW_MOVER) & (scene.classes[owners] != _VEHICLE))
+    gaps = graph.gaps[:, 0]
     speeds = []
-    for row in np.flatnonzero(close).tolist():
-        slowest, more = _SLOW_FOR_PERSON if is_person[row] else _SLOW_FOR_OBJECT
-        speeds.append((row, slowest + more * float(gaps[row])))
+    for row in ((gaps >= 0.0) & (gaps < max(config.person_slow_gap, config.object_slow_gap))).nonzero()[0].tolist():
+        owner, gap = scene.owners[row], float(gaps[row])
+        is_person = scene.classes[owner] == _PERSON
+        is_slow = scene.speeds[owner] < _SLOW_MOVER and scene.classes[owner] != _VEHICLE
+        if gap < (config.person_slow_gap if is_person else config.object_slow_gap) and (
+            is_slow or scene.is_standing[owner]
+        ):
+            slowest, more = _SLOW_FOR_PERSON if is_person else _SLOW_FOR_OBJECT
+            speeds.append((row, slowest + more * gap))
     return speeds

@@ -76,7 +76,7 @@ class NudgeDecider:
     def step(self, situation: Situation) -> list[Nudge]:
         """The nudges of this cycle by station; objects without one are passed by staying in lane, or stopped for."""
         scene, station = situation.scene, situation.window.station
-        standing = [scene.ids[row] for row in np.flatnonzero(scene.is_standing).tolist()]
+        standing = [scene.ids[row] for row in scene.is_standing.nonzero()[0].tolist()]
         self._since = {track: self._since.get(track, situation.time) for track in standing}
         nudges = []
         for blocker in self._blockers(scene, situation.window):
@@ -119,7 +119,7 @@ class NudgeDecider:
                 float(now.offsets[row] + now.half_widths[row]),
                 float(wanted[row]),
             )
-            for row in np.flatnonzero(near).tolist()
+            for row in near.nonzero()[0].tolist()
         ]
         return sorted(blockers, key=lambda blocker: blocker.low)
 

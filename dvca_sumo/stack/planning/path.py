@@ -102,20 +102,21 @@ def path_along(
     cosines, sines, curvatures = window.cosines[ahead], window.sines[ahead], window.curvatures[ahead]
     x = window.x[ahead] - offsets * sines
     y = window.y[ahead] + offsets * cosines
-    faded = len(_FADE)
-    x[:faded] += (start.x - x[0]) * _FADE
-    y[:faded] += (start.y - y[0]) * _FADE
+    fade = _FADE[:count]  # near the end of the line the window is short
+    x[: len(fade)] += (start.x - x[0]) * fade
+    y[: len(fade)] += (start.y - y[0]) * fade
     scale = 1.0 - curvatures * offsets
     tangents = slopes / scale
     squared_cosines = 1.0 / (1.0 + tangents * tangents)
-    steps = np.hypot(x[1:] - x[:-1], y[1:] - y[:-1])
+    arcs = np.zeros(count)
+    np.hypot(x[1:] - x[:-1], y[1:] - y[:-1]).cumsum(out=arcs[1:])
     left, right = _swept(offsets, slopes, curvatures, shape)
     return Path(
         x=x,
         y=y,
         headings=window.headings[ahead] + np.arctan(tangents),
         curvatures=(curvatures + bends * squared_cosines / scale) * np.sqrt(squared_cosines) / scale,
-        arcs=np.concatenate(([0.0], np.cumsum(steps))),
+        arcs=arcs,
         left=left,
         right=right,
     )
@@ -196,15 +197,17 @@ def _upper_terms(rise: float, first: float, second: float) -> tuple[float, float
 
 def _swept(offsets: Floats, slopes: Floats, curvatures: Floats, shape: VehicleShape) -> tuple[Floats, Floats]:
     """Where the sides of the body pass each station: the body is straight and turns about the rear axle."""
-    left, right = np.empty(BEHIND + len(offsets)), np.empty(BEHIND + len(offsets))
     half = 0.5 * shape.width
-    left[:BEHIND], right[:BEHIND] = offsets[0] + half, offsets[0] - half
     halves = half * np.sqrt(1.0 + slopes * slopes)
-    left[BEHIND:], right[BEHIND:] = offsets + halves, offsets - halves
-    sides = left[BEHIND:].copy(), right[BEHIND:].copy()
-    for ahead in range(1, math.ceil(shape.front) + 1):
-        turned = (slopes - (0.5 * ahead) * curvatures) * ahead
-        part = slice(BEHIND + ahead, None)
-        np.maximum(left[part], (sides[0] + turned)[:-ahead], out=left[part])
-        np.minimum(right[part], (sides[1] + turned)[:-ahead], out=right[part])
+    # Each row: sides of the body so many metres ahead of the axle, by where the axle is.
+    ahead = np.arange(math.ceil(shape.front) + 1.0)[:, None]
+    turned = (slopes - 0.5 * ahead * curvatures) * ahead
+    lefts, rights = (offsets + halves) + turned, (offsets - halves) + turned
+    left, right = np.empty(BEHIND + len(offsets)), np.empty(BEHIND + len(offsets))
+    left[:BEHIND], right[:BEHIND] = offsets[0] + half, offsets[0] - half
+    left[BEHIND:], right[BEHIND:] = lefts[0], rights[0]
+    for metres in range(1, len(ahead)):
+        part = slice(BEHIND + metres, None)
+        np.maximum(left[part], lefts[metres, :-metres], out=left[part])
+        np.minimum(right[part], rights[metres, :-metres], out=right[part])
     return left, right

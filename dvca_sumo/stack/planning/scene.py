@@ -13,7 +13,7 @@ from dvca_sumo.stack.planning.reference import BEHIND, Window
 Flags = npt.NDArray[np.bool_]
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
-_SOON = int(np.searchsorted(PREDICTION_TIMES, 3.0))  # far enough to tell going from staying
+_SOON = int(np.searchsorted(PREDICTION_TIMES, 1.0))  # far enough to tell going from staying, too near for a guess
 _SPARSE = 4  # every so many times of a hypothesis do to bound it
 _AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
 
@@ -61,13 +61,12 @@ def scene_in(
     foreseen = _foreseen_speeds(predicted, counts)
     standing = foreseen < np.where(objects.classes == _PERSON, config.standing_speed, slowest)
     counts &= ~standing[predicted.owners]
-    rows = np.flatnonzero(counts)
     stays = np.ones(len(standing), dtype=np.bool_)
-    stays[predicted.owners[rows]] = False
+    stays[predicted.owners[counts]] = False
+    rows, still = counts.nonzero()[0], stays.nonzero()[0]
     rows = rows[_is_around(window, predicted.poses[rows])]
-    poses = predicted.poses[rows]
-    now, moving = _extents(window, objects.boxes, poses, predicted.owners[rows])
-    still = np.flatnonzero(stays)
+    owners = predicted.owners[rows]
+    now, futures = _extents(window, objects.boxes, predicted.poses[rows], owners, still)
     return Scene(
         ids=ids,
         classes=objects.classes,
@@ -75,66 +74,47 @@ def scene_in(
         is_standing=standing,
         now=now,
         times=PREDICTION_TIMES - (time - predicted.time),
-        owners=np.concatenate((predicted.owners[rows], still)),
+        owners=np.concatenate((owners, still)),
         probabilities=np.concatenate((predicted.probabilities[rows], np.ones(len(still)))),
         lanes=[predicted.lanes[row] for row in rows.tolist()] + [()] * len(still),
-        futures=_with_still(moving, now, still),
+        futures=futures,
         moving=len(rows),
     )
 
 
 def _foreseen_speeds(predicted: PredictedObjects, counts: Flags) -> Floats:
-    """Mean speed (n,) [m/s] over the next seconds in the fastest hypothesis that counts; 0 without any."""
-    rows = np.flatnonzero(counts)
-    moved = predicted.poses[rows, _SOON, :2] - predicted.poses[rows, 0, :2]
+    """Mean speed (n,) [m/s] over the next second in the fastest hypothesis that counts; 0 without any."""
+    moved = predicted.poses[counts, _SOON, :2] - predicted.poses[counts, 0, :2]
     speeds = np.zeros(len(predicted.objects.ids))
-    np.maximum.at(speeds, predicted.owners[rows], np.hypot(moved[:, 0], moved[:, 1]) / PREDICTION_TIMES[_SOON])
+    np.maximum.at(speeds, predicted.owners[counts], np.hypot(moved[:, 0], moved[:, 1]) / PREDICTION_TIMES[_SOON])
     return speeds
 
 
 def _is_around(window: Window, poses: Floats) -> Flags:
     """Hypotheses that come near the window's bounding box at all."""
-    ahead = slice(BEHIND, None)
-    around = np.ones(len(poses), dtype=np.bool_)
-    for axis, line in enumerate((window.x[ahead], window.y[ahead])):
-        values = poses[:, ::_SPARSE, axis]
-        around &= (values.max(axis=1) > line.min() - _AROUND) & (values.min(axis=1) < line.max() + _AROUND)
+    line = window.rows[:2, BEHIND:]
+    (west, south), (east, north) = line.min(axis=1) - _AROUND, line.max(axis=1) + _AROUND
+    x, y = poses[:, ::_SPARSE, 0], poses[:, ::_SPARSE, 1]
+    around: Flags = (x.max(axis=1) > west) & (x.min(axis=1) < east) & (y.max(axis=1) > south) & (y.min(axis=1) < north)
     return around
 
 
-def _extents(window: Window, boxes: Floats, poses: Floats, owners: Integers) -> tuple[Extents, Extents]:
-    """Of boxes (n, 5) now, and of hypotheses (h, t, 3)."""
-    count = len(boxes)
+def _extents(
+    window: Window, boxes: Floats, poses: Floats, owners: Integers, still: Integers
+) -> tuple[Extents, Extents]:
+    """Of boxes (n, 5) now; and of their futures: hypotheses (h, t, 3), then one for each of `still` that stays."""
+    count, (moving, times, _) = len(boxes), poses.shape
     flat = np.concatenate((boxes[:, :3], poses.reshape(-1, 3)))
-    stations, offsets, headings = window.project(flat[:, :2])
-    halves = 0.5 * np.concatenate((boxes[:, 3:], boxes[owners, 3:].repeat(poses.shape[1], axis=0)))
-    turn = flat[:, 2] - headings
-    directions = np.cos(turn)
+    extents = np.empty((5, len(flat)))
+    extents[0], extents[1], headings = window.project(flat[:, :2])
+    halves = 0.5 * np.concatenate((boxes[:, 3:], boxes[owners, 3:].repeat(times, axis=0)))
+    directions = np.cos(flat[:, 2] - headings)
     cosines, sines = np.abs(directions), np.sqrt(1.0 - directions * directions)
-    lengths = halves[:, 0] * cosines + halves[:, 1] * sines
-    widths = halves[:, 0] * sines + halves[:, 1] * cosines
-    columns = (stations, offsets, lengths, widths, directions)
-    now = Extents(*(column[:count] for column in columns))
-    return now, Extents(*(column[count:].reshape(poses.shape[:2]) for column in columns))
-
-
-def _with_still(moving: Extents, now: Extents, still: Integers) -> Extents:
-    """The hypotheses, followed by one that stays for each object in `still`."""
-    count, times = moving.stations.shape
-    columns = []
-    for future, present in zip(_columns(moving), _columns(now), strict=True):
-        column = np.empty((count + len(still), times))
-        column[:count] = future
-        column[count:] = present[still, None]
-        columns.append(column)
-    return Extents(*columns)
-
-
-def _columns(extents: Extents) -> tuple[Floats, ...]:
-    return (
-        extents.stations,
-        extents.offsets,
-        extents.half_lengths,
-        extents.half_widths,
-        extents.directions,
-    )
+    extents[2] = halves[:, 0] * cosines + halves[:, 1] * sines
+    extents[3] = halves[:, 0] * sines + halves[:, 1] * cosines
+    extents[4] = directions
+    now = extents[:, :count]
+    futures = np.empty((5, moving + len(still), times))
+    futures[:, :moving] = extents[:, count:].reshape(5, moving, times)
+    futures[:, moving:] = now[:, still, None]
+    return Extents(*now), Extents(*futures)

@@ -61,14 +61,13 @@ class Profile(msgspec.Struct, frozen=True, eq=False):
 
     def rows(self) -> tuple[Floats, Floats, Floats]:
         """Arcs, speeds and accelerations at TRAJECTORY_TIMES; arcs never decrease."""
-        arcs, speeds, accelerations = (np.empty(len(TRAJECTORY_TIMES)) for _ in range(3))
+        arcs, speeds, accelerations = np.empty((3, len(TRAJECTORY_TIMES)))
         arcs[::2], speeds[::2], accelerations[::2] = self.arcs, self.speeds, self.accelerations
         s, v, a = self.arcs[:-1], self.speeds[:-1], self.accelerations[:-1]
         half, rise = 0.5 * STEP, 0.5 * (self.accelerations[1:] - a)
         accelerations[1::2] = a + rise
-        speeds[1::2] = np.maximum(v + half * (a + 0.5 * rise), 0.0)
-        stopping = (v > 0.0) & (self.speeds[1:] == 0.0)
-        speeds[1::2][stopping] = np.maximum(0.5 * v[stopping] - _STANDSTILL, 0.0)
+        is_stopping = (v > 0.0) & (self.speeds[1:] == 0.0)
+        speeds[1::2] = np.maximum(np.where(is_stopping, 0.5 * v - _STANDSTILL, v + half * (a + 0.5 * rise)), 0.0)
         arcs[1::2] = np.minimum(np.maximum(s + half * (v + half * (0.5 * a + rise / 6.0)), s), self.arcs[1:])
         return arcs, speeds, accelerations
 

@@ -17,6 +17,7 @@ PRESENT = 0.3  # [s] what occupies the path within this time is there already
 _BICYCLE, _PERSON = int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 _WALKS_ACROSS = 0.3  # [m/s] sideways
 _NEVER = 1e4  # [m] for places where there is no leader
+_ENDS = np.array([0.0, -1.0, 1.0])[:, None, None]  # an object's middle, near and far end, in half lengths
 _AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
 
 
@@ -41,15 +42,16 @@ def graph_of(
 ) -> Graph:
     """What comes within its margin of where the ego's body passes, at or ahead of the rear bumper."""
     futures = scene.futures
-    rows = window.index(futures.stations)
+    # The body may pass an object's middle with room to spare and yet sweep over its near or far end.
+    rows = window.index(futures.stations + _ENDS * futures.half_lengths)
     gaps = np.maximum(
-        futures.offsets - futures.half_widths - path.left[rows],
-        path.right[rows] - futures.offsets - futures.half_widths,
+        futures.offsets - futures.half_widths - path.left[rows].max(axis=0),
+        path.right[rows].min(axis=0) - futures.offsets - futures.half_widths,
     )
     count = len(path.arcs)
     stretch = np.zeros(BEHIND + count)
     stretch[BEHIND:] = path.arcs - np.arange(count)
-    centres = futures.stations + stretch[rows]
+    centres = futures.stations + stretch[rows[0]]
     low, high = centres - futures.half_lengths, centres + futures.half_lengths
     occupied = gaps < _margins(scene, window, crossings, config)[:, None]
     occupied &= (high > -shape.rear_overhang) & (futures.stations < count - 2)

@@ -1,0 +1,122 @@
+"""Stacks for tests of the fork engine, as `--stack forking_stacks:NAME` finds them.
+
+Messages carry no sign of being substituted, but ids of ideally perceived objects are far larger than
+track numbers: planning can tell by them, and do what the stack is named after.
+"""
+
+import ctypes
+import faulthandler
+import os
+import select
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from small_stacks import Spoilt
+
+from dvca_sumo.messages import LocalizationEstimate, PredictedObjects, SignalColour, Trajectory
+from dvca_sumo.stack.protocols import Planning
+from dvca_sumo.stack.reference import Stack, StackContext, reference_stack
+
+_LARGEST_TRACK_NUMBER = 100_000
+_PR_SET_PDEATHSIG = 1
+
+told = -1  # descriptor that the stacks write into, set by a test
+analysis = -1  # process id, likewise
+
+
+class OnIdeal:
+    """Planning that does something when it is given ideally perceived objects."""
+
+    def __init__(self, planning: Planning, act: Callable[[], None]) -> None:
+        self._planning, self._act = planning, act
+
+    def step(
+        self, localization: LocalizationEstimate, predicted: PredictedObjects, signals: dict[str, SignalColour]
+    ) -> Trajectory:
+        ids = predicted.objects.ids
+        if len(ids) > 0 and max(ids) > _LARGEST_TRACK_NUMBER:
+            self._act()
+        return self._planning.step(localization, predicted, signals)
+
+
+def on_ideal(context: StackContext, act: Callable[[], None]) -> Stack:
+    stack = reference_stack(context)
+    return replace(stack, planning=OnIdeal(stack.planning, act))
+
+
+def at_planning(context: StackContext, call: int, act: Callable[[], None]) -> Stack:
+    """Does something besides at the planning call of that number."""
+    stack = reference_stack(context)
+    return replace(stack, planning=Besides(stack.planning, call, act))
+
+
+class Besides(Spoilt):
+    """A component that once, at its call number `call`, does something besides."""
+
+    def step(self, *inputs: Any) -> Any:
+        self._left -= 1
+        if self._left == -1:
+            self._act()
+        return self._component.step(*inputs)
+
+
+def _crash() -> None:
+    faulthandler.disable()  # pytest's
+    print("last words", file=sys.stderr, flush=True)  # noqa: T201
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def _raise() -> None:
+    raise ZeroDivisionError("no way out")
+
+
+def _hang() -> None:
+    os.write(told, f"{os.getpid()} ".encode())
+    signal.pause()
+
+
+def _interrupt() -> None:
+    os.write(told, f"{os.getpid()} ".encode())
+    os.kill(analysis, signal.SIGINT)
+    signal.pause()
+
+
+def _scribble() -> None:
+    os.write(told, b"from a run")
+
+
+def _wait_for_ever() -> None:
+    threading.Thread(target=threading.Event().wait, daemon=True).start()
+
+
+def _outlive_analysis() -> None:
+    """As a branch does where the system does not tell of a parent's death: drive on without an analysis."""
+    if os.getpid() != analysis:
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, 0)
+        gone = os.pidfd_open(analysis)
+        os.kill(analysis, signal.SIGKILL)
+        select.select([gone], [], [])
+
+
+crashing = partial(on_ideal, act=_crash)
+raising = partial(on_ideal, act=_raise)
+leaving = partial(on_ideal, act=partial(sys.exit, 3))
+hanging = partial(on_ideal, act=_hang)
+interrupting = partial(on_ideal, act=_interrupt)
+killing_its_parent = partial(on_ideal, act=lambda: os.kill(os.getppid(), signal.SIGKILL))
+outliving_the_analysis = partial(on_ideal, act=_outlive_analysis)
+
+crashing_at_once = partial(at_planning, call=15, act=_crash)
+hanging_at_once = partial(at_planning, call=15, act=_hang)
+scribbling = partial(at_planning, call=15, act=_scribble)
+threaded_late = partial(at_planning, call=15, act=_wait_for_ever)
+
+
+def threaded(context: StackContext) -> Stack:
+    _wait_for_ever()
+    return reference_stack(context)
