@@ -34,6 +34,7 @@ SETTLE = 6.0  # [s]
 # ... or so long, when by then it has left the place of the factual violation behind.
 LEAST_SETTLE = 4.0  # [s]
 PAST = 10.0  # [m]
+_FURTHER = 60.0  # [s] the factual run goes on for past its first violation, to show what else happens
 _HORIZON = float(PREDICTION_TIMES[-1])  # [s] the factual run goes on for, so that its last futures are whole
 
 
@@ -171,7 +172,12 @@ def _jitters(request: Request) -> tuple[int | None, ...]:
 
 
 def _factual_task(request: Request) -> Task:
-    return Task(request.scenario, request.faults, StopRule(after_contact=_HORIZON), jitter=_jitters(request)[0])
+    return Task(
+        request.scenario,
+        request.faults,
+        StopRule(after_violation=_FURTHER, after_contact=_HORIZON),
+        jitter=_jitters(request)[0],
+    )
 
 
 def _steps(found: Attribution, engine: Engine, dtest: Dtest, request: Request) -> Iterator[Attribution]:

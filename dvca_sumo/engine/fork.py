@@ -26,7 +26,6 @@ from dvca_sumo.engine.orders import Driven
 from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.engine.replay import DEFAULT_TIMEOUT, ReplayEngine, raised, roadmap
-from dvca_sumo.engine.thinning import is_over_budget
 from dvca_sumo.interventions import Fault, Ideal
 from dvca_sumo.record import TICK, Record
 from dvca_sumo.run import Task
@@ -154,9 +153,8 @@ class ForkEngine:
             return []
         self._grove.catch_up()
         checkpoints = sorted(self._grove.checkpoints, key=lambda one: one.parked.step)
-        parked = [one.parked for one in checkpoints]
-        known = {one.step for one in parked}
-        is_full = is_over_budget(sum(one.copied for one in parked), [one.process for one in parked])
+        known = {one.parked.step for one in checkpoints}
+        is_full = self._grove.memory.is_over_budget(self.checkpoint_processes)
         plans = []
         for task in tasks:
             latest = self._latest_step(task)

@@ -18,6 +18,7 @@ import msgspec
 from dvca_sumo.engine.branching import STEM_LOG
 from dvca_sumo.engine.orders import Driven, Message, Parked, Started
 from dvca_sumo.engine.processes import death, die_with, said_in
+from dvca_sumo.engine.thinning import Memory
 
 _BACKLOG = 64
 _GRACE = 5.0  # [s] of wall time for parked processes to end
@@ -44,6 +45,7 @@ class Grove:
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._connections: list[Connection] = []
         self.checkpoints: list[Checkpoint] = []  # as far as was heard of them
+        self.memory = Memory()  # of the checkpoints
         self.numbers = itertools.count()  # of orders
         self._process: int | None = None
         self._is_stem_idle = False
@@ -128,6 +130,7 @@ class Grove:
             return [(connection, None)]
         if isinstance(message, Parked):
             self.checkpoints.append(Checkpoint(message, connection))
+            self.memory.add(message.copied)
             return []
         self._is_stem_idle |= isinstance(message, Driven)
         return [(connection, message)]

@@ -8,24 +8,41 @@ from pathlib import Path
 MEMORY_BUDGET = 1 << 30  # [bytes] that parked processes may hold for themselves
 
 
+class Memory:
+    """What parked processes hold for themselves. Measuring takes milliseconds each: only when it may be too much."""
+
+    def __init__(self) -> None:
+        self._most = 0  # [bytes]
+
+    def add(self, copied: int) -> None:
+        """One more process is parked, which holds at most `copied` [bytes] that no earlier one holds."""
+        self._most += copied
+
+    def is_over_budget(self, processes: Iterable[int]) -> bool:
+        """Whether `processes`, all that are left, hold more than the budget."""
+        if self._most > MEMORY_BUDGET:
+            self._most = sum(map(private_memory, processes))
+        return self._most > MEMORY_BUDGET
+
+
 class Kept:
     """The stem's checkpoints, numbered as they were made."""
 
     def __init__(self) -> None:
         self._processes: dict[int, int] = {}  # by number
-        self._copied = 0  # [bytes]
+        self._memory = Memory()
         self._dropped: list[int] = []  # until they are gone: their end takes a while
 
     def add(self, number: int, process: int, copied: int) -> None:
-        """Keep one more, a child of this process that holds `copied` [bytes] more, and drop what is kept no longer.
+        """Keep one more, a child of this process (`copied`: see `Memory`), and drop what is kept no longer.
 
         Over the budget the oldest are dropped, but for the first of all and the latest.
         """
         self._processes[number] = process
-        self._copied += copied
+        self._memory.add(copied)
         for old in [one for one in self._processes if not is_kept(one, number)]:
             self._drop(old)
-        while len(self._processes) > 2 and is_over_budget(self._copied, self._processes.values()):
+        while len(self._processes) > 2 and self._memory.is_over_budget(self._processes.values()):
             self._drop(sorted(self._processes)[1])
 
     def _drop(self, number: int) -> None:
@@ -43,14 +60,6 @@ def is_kept(number: int, latest: int) -> bool:
     for each doubling of the age.
     """
     return number == 0 or latest - number < 4 * (number & -number)
-
-
-def is_over_budget(copied: int, processes: Iterable[int]) -> bool:
-    """Whether parked processes hold more than the budget; they hold at most `copied` [bytes].
-
-    Measuring costs milliseconds a process: it is done only when that much has been copied at all.
-    """
-    return copied > MEMORY_BUDGET and sum(map(private_memory, processes)) > MEMORY_BUDGET
 
 
 def private_memory(process: int) -> int:

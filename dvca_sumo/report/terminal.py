@@ -91,7 +91,8 @@ def _which_message(found: Attribution) -> Iterator[str]:
     ego = record.path[tick]
     yield ""
     yield f"MESSAGE    {mark.component.value} #{mark.index} at {mark.time:.2f} s - open this one first"
-    yield f"  ego      at ({ego.x:.1f}, {ego.y:.1f}), {ego.speed:.1f} m/s, {ego.acceleration:+.1f} m/s^2"
+    acceleration = round(ego.acceleration, 1) + 0.0  # no negative zero
+    yield f"  ego      at ({ego.x:.1f}, {ego.y:.1f}), {ego.speed:.1f} m/s, {acceleration:+.1f} m/s^2"
     yield f"  state    {_state(mark)}"
     for row, difference in enumerate(found.differences):
         yield f"  {'wrong' if row == 0 else '':<8} {difference.text}"

@@ -103,7 +103,7 @@ def test_every_run_is_kept_in_order_and_the_first_repeats_the_factual_one() -> N
     assert all(task.interventions[0] == FAULTY for task in engine.tasks)
 
 
-def test_the_factual_run_goes_on_for_one_prediction_horizon_past_a_contact() -> None:
+def test_the_factual_run_goes_on_for_a_minute_past_a_violation_and_one_prediction_horizon_past_a_contact() -> None:
     asked: list[Task] = []
 
     class Remembering(FakeEngine):
@@ -112,7 +112,9 @@ def test_the_factual_run_goes_on_for_one_prediction_horizon_past_a_contact() -> 
             return super().record(task)
 
     attribute(Remembering(lambda _: SAFE, [drive()]), Request(SCENARIO, (FAULTY,)), Progress())
-    assert asked == [Task(SCENARIO, (FAULTY,), StopRule(after_contact=float(PREDICTION_TIMES[-1])))]
+    assert asked == [
+        Task(SCENARIO, (FAULTY,), StopRule(after_violation=60.0, after_contact=float(PREDICTION_TIMES[-1])))
+    ]
 
 
 def test_a_witness_that_agrees_certifies_the_two_ends_and_the_whole_component() -> None:

@@ -94,22 +94,12 @@ def _wait_for_ever() -> None:
     threading.Thread(target=threading.Event().wait, daemon=True).start()
 
 
-def _outlive_analysis() -> None:
-    """As a branch does where the system does not tell of a parent's death: drive on without an analysis."""
-    if os.getpid() != analysis:
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, 0)
-        gone = os.pidfd_open(analysis)
-        os.kill(analysis, signal.SIGKILL)
-        select.select([gone], [], [])
-
-
 crashing = partial(on_ideal, act=_crash)
 raising = partial(on_ideal, act=_raise)
 leaving = partial(on_ideal, act=partial(sys.exit, 3))
 hanging = partial(on_ideal, act=_hang)
 interrupting = partial(on_ideal, act=_interrupt)
 killing_its_parent = partial(on_ideal, act=lambda: os.kill(os.getppid(), signal.SIGKILL))
-outliving_the_analysis = partial(on_ideal, act=_outlive_analysis)
 
 crashing_at_once = partial(at_planning, call=15, act=_crash)
 hanging_at_once = partial(at_planning, call=15, act=_hang)
@@ -120,3 +110,20 @@ threaded_late = partial(at_planning, call=15, act=_wait_for_ever)
 def threaded(context: StackContext) -> Stack:
     _wait_for_ever()
     return reference_stack(context)
+
+
+def outliving_the_analysis(context: StackContext) -> Stack:
+    """In a branch that is under way before step 24: drives on without an analysis.
+
+    As it would where the system does not tell a branch of its parent's death.
+    """
+    stem = os.getpid()
+
+    def act() -> None:
+        if os.getpid() != stem:
+            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, 0)
+            end = os.pidfd_open(analysis)
+            os.kill(analysis, signal.SIGKILL)
+            select.select([end], [], [])
+
+    return at_planning(context, 24, act)

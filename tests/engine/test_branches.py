@@ -115,19 +115,38 @@ def test_a_checkpoint_that_dies_under_its_branch_costs_that_branch(task: Task, s
         assert failing(engine, task).reason == "the process it was branched off died"
 
 
+def kill_checkpoints(processes: tuple[int, ...]) -> None:
+    for process in processes:
+        os.kill(process, signal.SIGKILL)
+        wait_for(process)
+
+
 def test_checkpoints_that_died_before_are_done_without(task: Task, street: Path) -> None:
     asked = [ideal(task, since, PERCEPTION) for since in (0.5, 2.0, 3.5)]
     with fork_engine(street) as engine:
         engine.record(task)
         expected = outcomes(glimpses(engine, *asked))
-        for process in engine.checkpoint_processes[1:]:
-            os.kill(process, signal.SIGKILL)
-            wait_for(process)
+        kill_checkpoints(engine.checkpoint_processes[1:])
         assert outcomes(glimpses(engine, *asked)) == expected
-        for process in engine.checkpoint_processes:
-            os.kill(process, signal.SIGKILL)
-            wait_for(process)
+        kill_checkpoints(engine.checkpoint_processes)
         assert outcomes(glimpses(engine, *asked)) == expected
+
+
+def test_checkpoints_that_die_when_they_are_called_are_done_without(
+    task: Task, street: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = [ideal(task, since, PERCEPTION) for since in (0.5, 2.0)]
+    with fork_engine(street) as engine:
+        engine.record(task)
+        expected = outcomes(glimpses(engine, *asked))
+        assert engine._grove is not None
+        engine._grove.catch_up()
+        monkeypatch.setattr(engine._grove, "catch_up", lambda: None)
+        kill_checkpoints(engine.checkpoint_processes[1:])
+        assert outcomes(glimpses(engine, *asked)) == expected
+        kill_checkpoints(engine.checkpoint_processes[:1])
+        reasons = [one.reason for one in glimpses(engine, *asked) if isinstance(one, Failure)]
+        assert reasons == 2 * ["no copy of the run is left to branch it off"]
 
 
 def test_a_stem_that_died_is_not_needed_any_more(task: Task, street: Path) -> None:
@@ -208,7 +227,7 @@ def main():
         task = factual(Path("scenario"), Path(sys.argv[1]))
         engine.record(task)
         components = (Component.PERCEPTION, Component.PREDICTION)
-        glimpses(engine, *(ideal(task, 2.7, component) for component in components))
+        glimpses(engine, *(ideal(task, 2.5, component) for component in components))
         os.write(forking_stacks.told, b"done ")
 
 main()

@@ -102,11 +102,15 @@ def test_a_file_that_cannot_be_opened_again_is_not_shared_in_silence(
 
 
 def piecemeal(folder: Path, net: Path) -> Task:
-    """3000 vehicles over 3000 s, of which SUMO reads 200 s at a time; it reads some while the ego drives."""
+    """3000 vehicles over 3000 s, of which SUMO reads 200 s at a time, and a mebibyte of the file at a time.
+
+    It reads the second one, which begins with what departs at 206 s, while the ego drives.
+    """
     ego = '<trip id="ego" from="ab" to="bc" depart="190" departPos="20" departSpeed="10" arrivalPos="90"/>'
-    padding = '<param key="padding" value="' + 400 * "x" + '"/>'
-    ways = [f'<route edges="{edge}"/>{padding}</vehicle>' for edge in ("bn", "bs")]
-    leaving = [f'<vehicle id="v{time}" depart="{time}" departSpeed="10">{ways[time % 2]}' for time in range(3000)]
+    leaving = [
+        f'<vehicle id="v{time}" depart="{time}" departSpeed="10"><route edges="{edge}"/></vehicle>'.ljust(2**20 // 206)
+        for time, edge in enumerate(1500 * ("bn", "bs"))
+    ]
     routes = "".join([*leaving[:190], ego, *leaving[190:]])
     return Task(load_scenario(scenario_file(folder, net, routes)), stop=StopRule(at=230.0))
 

@@ -16,7 +16,7 @@ from small_scenarios import EGO, TIMEOUT, scenario_file
 from dvca_sumo.engine import thinning
 from dvca_sumo.engine.fork import ForkEngine
 from dvca_sumo.engine.protocol import Glimpse
-from dvca_sumo.engine.thinning import is_kept
+from dvca_sumo.engine.thinning import Memory, is_kept
 from dvca_sumo.installation import scenario_path
 from dvca_sumo.interventions import Futures, planted_fault, recorded_futures
 from dvca_sumo.messages import Component
@@ -64,9 +64,10 @@ def test_a_branch_is_the_replayed_run_bit_for_bit(name: str, fault: str) -> None
 
 
 def test_a_branch_begins_before_the_first_message_that_it_substitutes(task: Task, street: Path) -> None:
-    starts = (0.0, 0.005, 0.09, 0.095, 1.55, 2.09, 2.1, 2.101, 30.0)
-    with fork_engine(street, spacing=1) as engine:
+    with fork_engine(street) as engine:
         engine.record(task)
+        assert 20 in _steps(engine)
+        starts = (0.0, 1.99, 1.991, 1.995, 2.0, 2.001, 2.09, 30.0)
         assert_as_replayed(engine, street, None, *(ideal(task, since, CONTROL) for since in starts))
 
 
@@ -226,6 +227,28 @@ def test_a_run_keeps_the_start_and_checkpoints_at_doubling_distances(task: Task,
     assert steps[0] == 0
 
 
+def test_memory_is_measured_only_when_more_may_have_been_copied_than_the_budget(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    held = {1: 300, 2: 500}
+    measured: list[int] = []
+
+    def measure(process: int) -> int:
+        measured.append(process)
+        return held[process]
+
+    monkeypatch.setattr(thinning, "MEMORY_BUDGET", 1000)
+    monkeypatch.setattr(thinning, "private_memory", measure)
+    memory = Memory()
+    for copied, so_often in ((1000, 0), (1, 2), (199, 2), (2, 4)):
+        memory.add(copied)
+        assert not memory.is_over_budget(held)
+        assert len(measured) == so_often
+    held[2] = 900
+    memory.add(201)
+    assert memory.is_over_budget(held)
+
+
 def test_a_memory_budget_that_is_used_up_leaves_the_start_and_the_latest(
     task: Task, street: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -247,17 +270,18 @@ def test_an_engine_that_was_closed_goes_on_from_time_0(task: Task, street: Path)
         assert outcomes(glimpses(engine, asked)) == outcomes(glimpses(engine.witness, asked))
 
 
-def python(script: str, *words: str) -> str:
-    """What a script of its own process prints; it must not complain."""
+def python(script: str, folder: Path, *words: str) -> str:
+    """What a script in a process of its own prints; it must not complain, nor leave a temporary file in `folder`."""
     said = subprocess.run(  # noqa: S603 our own script
         [sys.executable, "-c", script, *words],
         check=True,
         capture_output=True,
         text=True,
         timeout=TIMEOUT,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), "TMPDIR": str(folder)},
     )
     assert said.stderr == ""
+    assert list(folder.iterdir()) == []
     return said.stdout.strip()
 
 
@@ -267,10 +291,12 @@ def test_a_drive_that_is_never_explained_does_not_keep_python_from_ending(tmp_pa
         "drive = dvca_sumo.drive(dvca_sumo.load_scenario(sys.argv[1]), engine='fork')\n"
         "print(drive.engine.checkpoint_processes)\n"
     )
-    assert python(script, str(scenario_file(tmp_path, street))) not in ("", "()")
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    assert python(script, folder, str(scenario_file(tmp_path, street))) not in ("", "()")
 
 
-def test_a_system_that_cannot_fork_has_the_replay_engine() -> None:
+def test_a_system_that_cannot_fork_has_the_replay_engine(tmp_path: Path) -> None:
     script = (
         "import sys, dvca_sumo.api\n"
         "for name in [name for name in sys.modules if name.startswith('dvca_sumo')]:\n"
@@ -280,7 +306,7 @@ def test_a_system_that_cannot_fork_has_the_replay_engine() -> None:
         "import dvca_sumo.api\n"
         "print(dvca_sumo.api.DEFAULT_ENGINE)\n"
     )
-    assert python(script) == "replay"
+    assert python(script, tmp_path) == "replay"
 
 
 def _steps(engine: ForkEngine) -> list[int]:
