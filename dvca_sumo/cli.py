@@ -43,8 +43,7 @@ class ExitCode(IntEnum):
 class _Terminal(Progress):
     """Progress on standard error."""
 
-    def __init__(self, engine: str, jobs: int) -> None:
-        self._engine = engine
+    def __init__(self, jobs: int) -> None:
         self._jobs = jobs
         self._begin = time.perf_counter()
         self._factual_wall = 0.0
@@ -61,10 +60,10 @@ class _Terminal(Progress):
         since = f" from #{probe.question.since.index}" if probe.question.since is not None else ""
         _tell(f"probe {self._probes}: ideal {ideal}{since}: {probe.outcome.value}, {probe.wall:.1f} s")
 
-    def timing(self) -> Timing:
+    def timing(self, engine: str) -> Timing:
         """What it cost up to now."""
         attribution = time.perf_counter() - self._begin - self._factual_wall
-        return Timing(self._factual_wall, attribution, self._engine, self._jobs)
+        return Timing(self._factual_wall, attribution, engine, self._jobs)
 
 
 @click.group()
@@ -117,16 +116,18 @@ def run(
         raise click.UsageError("--repeats goes with --jitter: in exact mode every run is the same")
     if output is not None:
         _make(output)
-    terminal = _Terminal(engine, jobs)
+    terminal = _Terminal(jobs)
     scenario = load_scenario(sumocfg, ego, seed, begin, end)
     drive = api.drive(scenario, faults, stack, (repeats or _REPEATS) if jitter else None, jobs, engine)
     terminal.factual(drive.record)
+    if drive.engine.fallback is not None:
+        _tell(f"engine {drive.engine.name}: {drive.engine.fallback}")
     try:
         found = api.attribute(drive, terminal, certify=certify)
     except AttributionStoppedError as stopped:
-        _publish(drive, stopped.partial, terminal.timing(), output, as_json=as_json)
+        _publish(drive, stopped.partial, terminal.timing(drive.engine.name), output, as_json=as_json)
         raise KeyboardInterrupt from None
-    _publish(drive, found, terminal.timing(), output, as_json=as_json)
+    _publish(drive, found, terminal.timing(drive.engine.name), output, as_json=as_json)
     sys.exit(_exit_code(found))
 
 
