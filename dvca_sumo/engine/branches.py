@@ -7,8 +7,8 @@ from multiprocessing.connection import Connection
 
 import msgspec
 
-from dvca_sumo.engine.grove import Checkpoint, Grove, kill
-from dvca_sumo.engine.orders import Delivered, Died, Order, Started
+from dvca_sumo.engine.grove import Checkpoint, Grove
+from dvca_sumo.engine.orders import Delivered, Died, Order, Recall
 from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.run import Task
@@ -24,13 +24,12 @@ class Plan(msgspec.Struct, frozen=True):
     steps: tuple[int, ...]  # where to leave new ones
 
 
-class _Branch(msgspec.Struct):
+class _Branch(msgspec.Struct, frozen=True):
     """An order under way."""
 
     row: int
     deadline: float  # of time.monotonic
     checkpoint: Connection
-    process: int | None = None
 
 
 class Branches:
@@ -54,8 +53,8 @@ class Branches:
                 if self._running:
                     yield from self._finished()
         finally:
-            for branch in self._running.values():
-                _end(branch)
+            for number, branch in self._running.items():
+                _recall(number, branch)
 
     def _is_ordered(self, row: int, plan: Plan) -> bool:
         number = next(self._grove.numbers)
@@ -73,19 +72,14 @@ class Branches:
             if branch is None:  # of an earlier batch, or told twice
                 continue
             if isinstance(answer, Failure):
-                _end(branch)
+                _recall(number, branch)
                 yield branch.row, msgspec.structs.replace(answer, said=self._grove.said_by(number))
             else:
                 yield branch.row, answer
 
     def _news(self) -> Answers:
         for connection, message in self._grove.heard(min(branch.deadline for branch in self._running.values())):
-            if isinstance(message, Started):
-                if message.order in self._running:
-                    self._running[message.order].process = message.process
-                else:  # given up before it began
-                    kill(message.process)
-            elif isinstance(message, Died):
+            if isinstance(message, Died):
                 yield message.order, Failure(message.reason, "")
             elif isinstance(message, Delivered):
                 yield message.order, message.answer
@@ -98,6 +92,6 @@ class Branches:
         yield from ((number, Failure(f"no answer within {self._timeout:g} s", "")) for number in late)
 
 
-def _end(branch: _Branch) -> None:
-    if branch.process is not None:
-        kill(branch.process)
+def _recall(number: int, branch: _Branch) -> None:
+    with contextlib.suppress(OSError):  # the checkpoint died, and with it the branch
+        branch.checkpoint.send(Recall(number))

@@ -6,9 +6,9 @@ of it, and ends. With ideal predictions the branch stays where it is and forks a
 takes. A fork copies everything, SUMO, stack, oracles and record, so a branch is bit for bit what a run
 from time 0 would have become.
 
-Rules of this file: no thread; a child makes its descriptors its own before its parent goes on; every
-process ends by `os._exit`, so that it never cleans up what others still use; a parked process ends
-when the analysis closes its connection, a driving one when the process that forked it ends.
+Rules of this file: no thread; every process ends by `os._exit`, so that it never cleans up what others
+still use; a parked process ends when the analysis closes its connection, a driving one when the process
+that forked it ends.
 """
 
 import contextlib
@@ -17,18 +17,18 @@ import os
 import signal
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable
 from functools import partial
 from multiprocessing.connection import Client, Connection, Pipe, wait
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NoReturn
 
 from dvca_sumo.engine.descriptors import make_own
-from dvca_sumo.engine.orders import Delivered, Died, Driven, Order, Parked, Started
+from dvca_sumo.engine.forking import Child, Lineage, NotForkedError
+from dvca_sumo.engine.orders import Delivered, Died, Driven, Order, Parked, Recall
 from dvca_sumo.engine.passes import Pass, predicts_ideally, settled, summary
-from dvca_sumo.engine.processes import Failure, adopt_orphans, death, die_with, print_to_descriptors, raised_here
+from dvca_sumo.engine.processes import Failure, adopt_orphans, death, print_to_descriptors, raised_here
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.engine.thinning import Kept
 from dvca_sumo.record import Record
@@ -41,15 +41,6 @@ if sys.platform != "win32":
 SPACING = 100  # world steps between the stem's checkpoints: what forking costs stays below a tenth of the run
 STEM_LOG = "stem"
 _PARKED_LOG = "parked"
-_READY = b"."
-_LONGEST_REASON = 4096  # [bytes] a pipe takes so many at once
-
-
-class _Child(NamedTuple):
-    """A process that was forked here."""
-
-    process: int
-    sign: int  # descriptor that can be read once the process has ended
 
 
 class Holder:
@@ -68,7 +59,7 @@ class Holder:
         self._folder = folder
         self._connection = connection
         self._log = folder / STEM_LOG
-        self._held: int | None = None  # open as long as this process lives: its parent sees its end by it
+        self._lineage = Lineage()
         self._is_stem = True
         self._wanted: frozenset[int] = frozenset()  # world steps at which a branch leaves checkpoints
         self._kept = Kept()
@@ -104,8 +95,9 @@ class Holder:
             os._exit(1)
 
     def _deliver_factual(self, answer: Record | Failure) -> NoReturn:
+        self._kept.bury()
         self._connection.send(Driven(answer, self._obstacle))
-        with contextlib.suppress(EOFError):
+        with contextlib.suppress(EOFError, OSError):
             self._connection.recv()  # whatever it is: the end
         with contextlib.suppress(ChildProcessError):
             while True:  # they end as this process does; it is the last, and leaves none unburied
@@ -121,7 +113,9 @@ class Holder:
         gc.freeze()  # the collector would touch, and so copy, every page of what is here already
         copied, self._copied = _copied_here() - self._copied, _copied_here()
         try:
-            child = self._forked(_PARKED_LOG, partial(self._park, step, copied))
+            if self._is_stem:
+                self._lineage.assert_alone()
+            child = self._lineage.forked(self._folder / _PARKED_LOG, partial(self._park, step, copied))
         except NotForkedError as error:
             self._obstacle = str(error)
             return
@@ -140,41 +134,46 @@ class Holder:
 
     def _awaited(self) -> Order:
         """Fork a branch for every order, and tell of those that die. Returns in a branch only: its order."""
-        branches: dict[int, tuple[int, int]] = {}  # sign -> order, process
+        branches: dict[int, Child] = {}  # by order
         try:
             while True:
-                for ready in wait([self._connection, *branches]):
+                signs = {child.sign: order for order, child in branches.items()}
+                for ready in wait([self._connection, *signs]):
                     if isinstance(ready, int):
-                        self._bury(ready, *branches.pop(ready))
-                        continue
-                    order: Order | None = self._connection.recv()
-                    if order is None:
-                        os._exit(0)
-                    if self._has_become_branch(order, branches):
+                        self._bury(signs[ready], branches.pop(signs[ready]))
+                    elif (order := self._called(branches)) is not None:
                         return order
         except BaseException:  # noqa: BLE001 - the analysis is gone
             os._exit(1)
 
-    def _has_become_branch(self, order: Order, branches: dict[int, tuple[int, int]]) -> bool:
+    def _called(self, branches: dict[int, Child]) -> Order | None:
+        """Do as the analysis says. Returns the order in the branch that is forked for it, None in this process."""
+        said: Order | Recall | None = self._connection.recv()
+        if said is None:
+            os._exit(0)
+        if isinstance(said, Recall):
+            if said.order in branches:
+                os.kill(branches[said.order].process, signal.SIGKILL)
+            return None
         try:
-            child = self._forked(str(order.number), self._connection.close, mortal=True)
+            child = self._lineage.forked(self._folder / str(said.number), self._connection.close, mortal=True)
         except NotForkedError as error:
-            self._connection.send(Died(order.number, str(error)))
-            return False
-        if child is None:
-            return True
-        branches[child.sign] = (order.number, child.process)
-        self._connection.send(Started(order.number, child.process))
-        return False
+            self._connection.send(Died(said.number, str(error)))
+            return None
+        if child is not None:
+            branches[said.number] = child
+            return None
+        return said
 
-    def _bury(self, sign: int, order: int, process: int) -> None:
-        os.close(sign)
-        code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+    def _bury(self, order: int, child: Child) -> None:
+        os.close(child.sign)
+        code = os.waitstatus_to_exitcode(os.waitpid(child.process, 0)[1])
         if code != 0:
             self._connection.send(Died(order, death(code)))
 
     def _obey(self, order: Order) -> None:
         """Become the branch that `order` asks for. Returns to drive on."""
+        self._log = self._folder / str(order.number)
         self._copied = 0  # the system counts anew for a new process
         self._deliver = lambda answer: self._report(order.number, self._glimpse(answer))
         if not predicts_ideally(order.task):
@@ -194,7 +193,7 @@ class Holder:
         """One pass, driven by a child. Raises `_DriveOn` there."""
         receiver, sender = Pipe(duplex=False)
         try:
-            child = self._forked(self._log.name, receiver.close, mortal=True)
+            child = self._lineage.forked(self._log, receiver.close, mortal=True)
         except NotForkedError as error:
             raise _PassFailedError(Failure(str(error), "")) from None
         if child is None:
@@ -231,57 +230,6 @@ class Holder:
         sender.send(answer if isinstance(answer, Failure) else self._summary(answer))
         os._exit(0)
 
-    def _forked(self, log: str, introduce: Callable[[], None], *, mortal: bool = False) -> _Child | None:
-        """Fork; returns the child, and in it None.
-
-        By then the child has made its descriptors its own, and done what `introduce` asks. A `mortal`
-        child ends with its parent; a checkpoint outlives the branch that left it.
-
-        Raises:
-            NotForkedError: There is no child.
-        """
-        if (threads := thread_count()) > 1:
-            raise NotForkedError(f"it runs {threads} threads, of which a copy of the process would have one")
-        sign, held = os.pipe()
-        parent = os.getpid()
-        try:
-            process = os.fork()
-        except OSError as error:
-            os.close(sign)
-            os.close(held)
-            raise NotForkedError(f"the system forks no process: {error.strerror}") from None
-        if process == 0:
-            os.close(sign)
-            self._settle_in(held, log, introduce, parent if mortal else None)
-            return None
-        os.close(held)
-        said = os.read(sign, _LONGEST_REASON)  # nothing may be read from a shared file before the child has its own
-        if said == _READY:
-            return _Child(process, sign)
-        os.close(sign)
-        os.waitpid(process, 0)
-        raise NotForkedError(f"a copy of the process cannot be set up: {said.decode() or 'it died'}")
-
-    def _settle_in(self, held: int, log: str, introduce: Callable[[], None], parent: int | None) -> None:
-        try:
-            if self._held is not None:
-                os.close(self._held)
-            self._held = held
-            self._log = self._folder / log
-            if parent is not None:
-                die_with(parent)
-            make_own(self._log)
-            introduce()
-            os.write(held, _READY)
-        except BaseException as error:  # noqa: BLE001 - the parent tells of it
-            with contextlib.suppress(OSError):
-                os.write(held, raised_here(error).reason.encode()[:_LONGEST_REASON])
-            os._exit(1)
-
-
-class NotForkedError(Exception):
-    """This process cannot be copied, and why."""
-
 
 class _DriveOn(BaseException):
     """Unwinds a freshly forked pass to the loop that drives."""
@@ -293,12 +241,6 @@ class _PassFailedError(Exception):
     def __init__(self, failure: Failure) -> None:
         super().__init__(failure.reason)
         self.failure = failure
-
-
-def thread_count() -> int:
-    """Threads of this process, a stack's own included."""
-    tasks = Path("/proc/self/task")
-    return len(list(tasks.iterdir())) if tasks.is_dir() else threading.active_count()
 
 
 def _copied_here() -> int:

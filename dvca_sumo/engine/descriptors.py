@@ -29,8 +29,8 @@ def make_own(log: Path) -> None:
     """
     said = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     null = os.open(os.devnull, os.O_WRONLY)
-    for number in map(int, os.listdir(_FOLDER)):  # noqa: PTH208 - the listing's own descriptor is closed by now
-        if number > 2 and number != said and _is_regular(number):
+    for number, mode in open_descriptors().items():
+        if number > 2 and number != said and stat.S_ISREG(mode):
             _own(number, null)
     os.dup2(said, 1)
     os.dup2(said, 2)
@@ -38,10 +38,13 @@ def make_own(log: Path) -> None:
     os.close(null)
 
 
-def _is_regular(number: int) -> bool:
-    with contextlib.suppress(OSError):  # not open any more
-        return stat.S_ISREG(os.fstat(number).st_mode)
-    return False
+def open_descriptors() -> dict[int, int]:
+    """Mode (`stat.S_ISREG` and its kind tell of what) of every descriptor that is open."""
+    modes: dict[int, int] = {}
+    for number in map(int, os.listdir(_FOLDER)):  # noqa: PTH208 - numbers, not paths
+        with contextlib.suppress(OSError):  # the listing's own, closed by now
+            modes[number] = os.fstat(number).st_mode
+    return modes
 
 
 def _own(number: int, null: int) -> None:

@@ -16,11 +16,12 @@ from typing import NoReturn
 import msgspec
 
 from dvca_sumo.engine.branching import STEM_LOG
-from dvca_sumo.engine.orders import Driven, Message, Parked, Started
+from dvca_sumo.engine.orders import Driven, Message, Parked
 from dvca_sumo.engine.processes import death, die_with, said_in
 from dvca_sumo.engine.thinning import Memory
 
 _BACKLOG = 64
+_LONGEST_FOLDER = 70  # [bytes] a socket's whole path may have 103
 _GRACE = 5.0  # [s] of wall time for parked processes to end
 
 
@@ -40,7 +41,8 @@ class Grove:
         Raises:
             OSError: The system gives no socket or no process.
         """
-        self._folder = Path(tempfile.mkdtemp(prefix="dvca-sumo-fork-"))
+        is_short = len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER
+        self._folder = Path(tempfile.mkdtemp(prefix="dvca-sumo-fork-", dir=None if is_short else "/tmp"))  # noqa: S108
         self._owner = os.getpid()
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._connections: list[Connection] = []
@@ -86,10 +88,8 @@ class Grove:
 
     def catch_up(self) -> None:
         """Hear what was said up to now, when nothing is wanted of any branch."""
-        while said := self.heard(0.0):
-            for _, message in said:
-                if isinstance(message, Started):  # given up before it began
-                    kill(message.process)
+        while self.heard(0.0):
+            pass
 
     def said_by(self, order: int | None) -> str:
         """Last lines of the standard error of an order's branch; None: of the stem."""
@@ -122,21 +122,18 @@ class Grove:
     def _received(self, connection: Connection) -> list[tuple[Connection, Message | None]]:
         try:
             message: Message | Parked = connection.recv()
-        except (EOFError, OSError):
+        except BaseException as error:
+            # Interrupted in the middle of a message, nothing on it can be understood any more.
             self._connections.remove(connection)
             self.checkpoints = [one for one in self.checkpoints if one.connection is not connection]
             self._is_stem_idle &= connection is not self.stem
             connection.close()
-            return [(connection, None)]
+            if isinstance(error, (EOFError, OSError)):
+                return [(connection, None)]
+            raise
         if isinstance(message, Parked):
             self.checkpoints.append(Checkpoint(message, connection))
             self.memory.add(message.copied)
             return []
         self._is_stem_idle |= isinstance(message, Driven)
         return [(connection, message)]
-
-
-def kill(process: int) -> None:
-    """End a branch."""
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(process, signal.SIGKILL)

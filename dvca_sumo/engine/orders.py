@@ -16,19 +16,18 @@ class Order(msgspec.Struct, frozen=True):
     steps: tuple[int, ...]
 
 
+class Recall(msgspec.Struct, frozen=True):
+    """To a checkpoint: end the branch of that order, if it has not ended."""
+
+    order: int
+
+
 class Parked(msgspec.Struct, frozen=True):
     """A checkpoint is there, before the world step `step`."""
 
     step: int
     process: int
     copied: int  # [bytes] at most so much it holds that no earlier one holds too
-
-
-class Started(msgspec.Struct, frozen=True):
-    """A checkpoint has obeyed: the branch is under way."""
-
-    order: int
-    process: int
 
 
 class Died(msgspec.Struct, frozen=True):
@@ -52,4 +51,4 @@ class Driven(msgspec.Struct, frozen=True):
     obstacle: str  # why the stem could not leave a checkpoint when one was due; empty: it could
 
 
-Message = Started | Died | Delivered | Driven
+Message = Died | Delivered | Driven

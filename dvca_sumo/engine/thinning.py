@@ -45,6 +45,11 @@ class Kept:
         while len(self._processes) > 2 and self._memory.is_over_budget(self._processes.values()):
             self._drop(sorted(self._processes)[1])
 
+    def bury(self) -> None:
+        """Wait until all that were dropped are gone, so that nobody calls them any more."""
+        while self._dropped:
+            os.waitpid(self._dropped.pop(), 0)
+
     def _drop(self, number: int) -> None:
         process = self._processes.pop(number)
         os.kill(process, signal.SIGKILL)

@@ -7,8 +7,10 @@ track numbers: planning can tell by them, and do what the stack is named after.
 import ctypes
 import faulthandler
 import os
+import random
 import select
 import signal
+import subprocess
 import sys
 import threading
 from collections.abc import Callable
@@ -18,7 +20,7 @@ from typing import Any
 
 from small_stacks import Spoilt
 
-from dvca_sumo.messages import LocalizationEstimate, PredictedObjects, SignalColour, Trajectory
+from dvca_sumo.messages import ControlCommand, LocalizationEstimate, PredictedObjects, SignalColour, Trajectory
 from dvca_sumo.stack.protocols import Planning
 from dvca_sumo.stack.reference import Stack, StackContext, reference_stack
 
@@ -105,6 +107,25 @@ crashing_at_once = partial(at_planning, call=15, act=_crash)
 hanging_at_once = partial(at_planning, call=15, act=_hang)
 scribbling = partial(at_planning, call=15, act=_scribble)
 threaded_late = partial(at_planning, call=15, act=_wait_for_ever)
+
+
+class Wobbling:
+    """Control that draws its steering from Python's own random numbers, as a user's may."""
+
+    def step(self, localization: LocalizationEstimate, trajectory: Trajectory | None) -> ControlCommand:  # noqa: ARG002
+        return ControlCommand(localization.time, 0.5, random.uniform(-0.01, 0.01))  # noqa: S311
+
+
+def wobbling(context: StackContext) -> Stack:
+    random.seed(context.seed)
+    return replace(reference_stack(context), control=Wobbling())
+
+
+def conversing(context: StackContext) -> Stack:
+    """Has a process of its own to talk to."""
+    process = subprocess.Popen(["cat"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)  # noqa: S607
+    stack = reference_stack(context)
+    return replace(stack, planning=Besides(stack.planning, 15, process.poll))
 
 
 def threaded(context: StackContext) -> Stack:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import forking_stacks
 import pytest
-from forking import Alive, factual, fork_engine, glimpses, ideal, outcomes
+from forked_drives import Alive, factual, fork_engine, glimpses, ideal, outcomes
 from small_scenarios import TIMEOUT
 
 from dvca_sumo.engine.fork import ForkEngine
@@ -218,7 +218,7 @@ SCRIPT = """
 import os, sys
 from pathlib import Path
 import forking_stacks
-from forking import factual, fork_engine, glimpses, ideal
+from forked_drives import factual, fork_engine, glimpses, ideal
 from dvca_sumo.messages import Component
 
 def main():
@@ -238,11 +238,12 @@ def analysing(folder: Path, net: Path, stack: str) -> tuple[subprocess.Popen[byt
     """An analysis in a process of its own; a pipe that its stack writes into, open as long as anybody lives."""
     reader, writer = os.pipe()
     tests = Path(__file__).parents[1]
+    paths = os.pathsep.join(map(str, (tests.parent, tests, tests / "engine")))
     process = subprocess.Popen(  # noqa: S603 our own script
         [sys.executable, "-c", SCRIPT, str(net), stack, str(writer)],
         pass_fds=[writer],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (tests.parent, tests, tests / "engine")))},
+        env={**os.environ, "PYTHONPATH": paths, "TMPDIR": str(folder)},
     )
     os.close(writer)
     return process, reader

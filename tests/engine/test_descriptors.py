@@ -7,7 +7,7 @@ from typing import Any
 
 import forking_stacks
 import pytest
-from forking import assert_as_replayed, fork_engine, glimpses, ideal
+from forked_drives import assert_as_replayed, fork_engine, glimpses, ideal
 from small_scenarios import EGO, in_child, scenario_file
 
 from dvca_sumo.engine import descriptors

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from forking import SUBSTITUTABLE, assert_as_replayed, factual, fork_engine, glimpses, ideal, outcomes
+from forked_drives import SUBSTITUTABLE, assert_as_replayed, factual, fork_engine, glimpses, ideal, outcomes
 from msgspec.structs import replace
 from small_scenarios import EGO, TIMEOUT, scenario_file
 
-from dvca_sumo.engine import thinning
+from dvca_sumo.engine import grove, thinning
 from dvca_sumo.engine.fork import ForkEngine
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.engine.thinning import Memory, is_kept
@@ -36,6 +36,13 @@ FULL_THROTTLE = "small_stacks:full_throttle"
 @pytest.fixture
 def task(tmp_path: Path, street: Path) -> Task:
     return factual(tmp_path, street)
+
+
+def test_pythons_own_random_numbers_go_on_in_a_branch(task: Task, street: Path) -> None:
+    stack = "forking_stacks:wobbling"
+    with fork_engine(street, stack) as engine:
+        engine.record(task)
+        assert_as_replayed(engine, street, stack, *(ideal(task, since, PREDICTION) for since in (1.0, 2.5)))
 
 
 def accelerating(folder: Path, net: Path) -> Task:
@@ -145,7 +152,12 @@ def test_another_scenario_or_fault_is_replayed(task: Task, street: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("stack", "words"), [("threaded", "the run cannot be branched: it runs 2 threads"), (None, "jitter")]
+    ("stack", "words"),
+    [
+        ("threaded", "the run cannot be branched: it runs 2 threads"),
+        ("conversing", "the run cannot be branched: it has a pipe or socket"),
+        (None, "jitter"),
+    ],
 )
 def test_what_cannot_be_branched_is_replayed_and_the_reason_told(
     task: Task, street: Path, stack: str | None, words: str
@@ -172,24 +184,31 @@ def test_a_thread_that_is_started_later_leaves_the_checkpoints_before_it(task: T
         assert_as_replayed(engine, street, "forking_stacks:threaded_late", ideal(task, 3.0, PERCEPTION))
 
 
-@pytest.mark.parametrize("name", ["fork", "socket"])
-def test_a_system_without_processes_or_sockets_to_give_is_no_error(
-    task: Task, street: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str
+@pytest.mark.parametrize("name", ["fork", "pipe"])
+def test_a_system_without_processes_or_descriptors_to_give_is_no_error(
+    task: Task, street: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     def refuse() -> int:
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
-    folder = tmp_path / ("x" * 150)
-    folder.mkdir()
     with fork_engine(street) as engine, monkeypatch.context() as patch:
-        if name == "fork":
-            patch.setattr(os, "fork", refuse)
-            patch.setattr(engine.witness, "record", lambda _task: None)
-        else:
-            patch.setattr(tempfile, "tempdir", str(folder))
-        engine.record(task)
+        replayed = engine.witness.record(task)
+        patch.setattr(engine.witness, "record", lambda _task: replayed)
+        patch.setattr(*((os, "fork") if name == "fork" else (grove, "Pipe")), refuse)
+        assert engine.record(task) is replayed
         assert engine.fallback is not None
         assert "the system gives no process or socket" in engine.fallback
+
+
+def test_a_long_path_of_the_folder_for_temporary_files_does_not_matter(
+    task: Task, street: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / ("x" * 150)
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    with fork_engine(street) as engine:
+        engine.record(task)
+        assert engine.fallback is None
 
 
 def test_nothing_is_left_in_the_folder_for_temporary_files(
