@@ -12,7 +12,6 @@ from dvca_sumo.analysis.components import (
     SUBSTITUTABLE,
     ComponentAnswer,
     Verdict,
-    first_questions,
     responsible_component,
 )
 from dvca_sumo.analysis.differences import Difference, differences
@@ -30,9 +29,9 @@ from dvca_sumo.stack.reference import StackError
 from dvca_sumo.violations import Answer, Category, Violation
 
 # A counterfactual run is safe without any violation until so long after the factual one ...
-SETTLE = 6.0  # [s]
+SETTLE = 4.0  # [s]
 # ... or so long, when by then it has left the place of the factual violation behind.
-LEAST_SETTLE = 4.0  # [s]
+LEAST_SETTLE = 2.5  # [s]
 PAST = 10.0  # [m]
 _FURTHER = 60.0  # [s] the factual run goes on for past its first violation, to show what else happens
 _HORIZON = float(PREDICTION_TIMES[-1])  # [s] the factual run goes on for, so that its last futures are whole
@@ -183,8 +182,6 @@ def _factual_task(request: Request) -> Task:
 def _steps(found: Attribution, engine: Engine, dtest: Dtest, request: Request) -> Iterator[Attribution]:
     """The answer after each step of Algorithm 1."""
     assert found.violation is not None  # or there would be nothing to explain
-    # Asked together: neither concludes anything before the premise has been looked at.
-    dtest.ask_all([Question(()), *first_questions(found.record, found.violation.time)])
     doubt = _premise(engine, dtest, _factual_task(request), found)
     if doubt:
         yield replace(found, verdict=Verdict.NOT_REPRODUCIBLE, is_reproducible=False, reason=doubt)
@@ -234,7 +231,9 @@ def _component_message(found: Attribution, dtest: Dtest, answer: ComponentAnswer
     assert found.violation is not None
     assert answer.component is not None  # a verdict of COMPONENT names one
     record, component = found.record, answer.component
-    messages = violation_inducing_message(dtest, record, component, found.violation.time, is_exact=is_exact)
+    messages = violation_inducing_message(
+        dtest, record, component, found.violation.time, found.until, is_exact=is_exact
+    )
     mark = messages.last_safe
     return replace(
         found,

@@ -12,6 +12,9 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 
+_HALVINGS = 20  # of the interval that holds the best share
+
+
 class Outcome(enum.StrEnum):
     """The three answers of a dtest."""
 
@@ -28,29 +31,44 @@ class Bracket(msgspec.Struct, frozen=True):
 
 
 def bisect(
-    test_all: Callable[[Sequence[int]], Sequence[Outcome]], bracket: Bracket, points: Sequence[int] | None = None
+    test: Callable[[int], Outcome], bracket: Bracket, points: Sequence[int] | None = None, share: float = 0.5
 ) -> Bracket:
-    """Narrow a bracket to adjacent points, two questions at a time: run side by side, they cost hardly more than one.
+    """Narrow a bracket to adjacent points.
 
     Args:
-        test_all: Asked for one or two points at once, at most once for a point, never for the ends.
+        test: Asked at most once for a point, never for the ends.
         bracket: Proven ends.
         points: Ascending places to ask at; None: every whole number.
+        share: Where to ask, as a share of the points between, from the low end; see `best_share`.
 
     Returns:
-        A bracket whose ends are adjacent points, unless all points between them are UNRESOLVED. Costs at
-        most ceil(log3(number of points between + 1)) rounds, plus those of unresolved points.
+        A bracket whose ends are adjacent points, unless all points between them are UNRESOLVED. For n points
+        between the ends it costs at most floor(log(n) / -log(larger of share and 1 - share)) + 1 questions,
+        plus one for each unresolved point.
     """
     if points is None:
         points = range(bracket.low + 1, bracket.high)
     low, high = bracket.low, bracket.high
     candidates = [point for point in points if low < point < high]
     while candidates:
-        count = len(candidates)
-        asked = sorted({candidates[count // 3], candidates[2 * count // 3]})
-        answers = dict(zip(asked, test_all(asked), strict=True))
-        low = max([low, *(point for point, outcome in answers.items() if outcome is Outcome.SAFE)])
-        violating = [point for point, outcome in answers.items() if outcome is Outcome.VIOLATES and point > low]
-        high = min([high, *violating])
-        candidates = [one for one in candidates if low < one < high and one not in answers]
+        asked = candidates[int(share * len(candidates))]
+        outcome = test(asked)
+        if outcome is Outcome.SAFE:
+            low = asked
+        elif outcome is Outcome.VIOLATES:
+            high = asked
+        candidates = [one for one in candidates if low < one < high and one != asked]
     return Bracket(low, high)
+
+
+def best_share(safe: float, violates: float) -> float:
+    """Share at which a long bisection costs least when a SAFE answer costs `safe` and a VIOLATES `violates`.
+
+    Either answer then narrows the bracket in proportion to its cost: with x = share, (1 - x)^(1 / safe) =
+    x^(1 / violates) (D. E. Knuth, The Art of Computer Programming 3, section 6.2.2: trees with unequal costs).
+    """
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if middle**safe < (1.0 - middle) ** violates else (low, middle)
+    return low

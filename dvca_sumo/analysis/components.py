@@ -29,8 +29,8 @@ from dvca_sumo.record import MessageMark, Record
 SUBSTITUTABLE = (Component.LOCALIZATION, Component.PERCEPTION, Component.PREDICTION, Component.CONTROL)
 
 UPSTREAM = 2
-_AHEAD = 2  # levels that are asked together at first: run side by side, they cost hardly more than one
-_VECTOR = 8.0  # [s] before the violation from which single substitutions are shown when none can be enough
+_NEARLY_WHOLE = 1.5  # times a lookback: a drive that is not longer than this is asked as a whole
+_VECTOR = 4.0  # [s] before the violation from which single substitutions are shown when none can be enough
 
 
 class Verdict(enum.StrEnum):
@@ -67,12 +67,6 @@ def responsible_component(dtest: Dtest, record: Record, time: float) -> Componen
     return _concluded(all_ideal, singles)
 
 
-def first_questions(record: Record, time: float) -> list[Question]:
-    """What `responsible_component` will ask first whatever the answers, to be asked ahead."""
-    first = lookbacks(record.start, time)[:_AHEAD]
-    return [Question(SUBSTITUTABLE, mark_before(record, Component.LOCALIZATION, time, back)) for back in first]
-
-
 def mark_before(record: Record, component: Component, time: float, back: float | None) -> MessageMark | None:
     """The first message of `component` from `back` [s] before `time` on; None where that is its first of all."""
     if back is None:
@@ -82,10 +76,10 @@ def mark_before(record: Record, component: Component, time: float, back: float |
 
 
 def lookbacks(start: float, time: float) -> list[float | None]:
-    """1, 2, 4, 8 ... s before `time`, as long as that is after `start`; then None, the whole drive."""
+    """1, 2, 4, 8 ... s before `time`, as long as that leaves a good part of the drive; then None, the whole drive."""
     found: list[float | None] = []
     back = 1.0
-    while time - back > start:
+    while time - _NEARLY_WHOLE * back > start:
         found.append(back)
         back *= 2.0
     return [*found, None]

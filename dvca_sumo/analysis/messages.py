@@ -1,10 +1,8 @@
 """Message level: the last message of the responsible component that could still have prevented it (Definition 11)."""
 
-from collections.abc import Callable, Sequence
-
 import msgspec
 
-from dvca_sumo.analysis.bisection import Bracket, Outcome, bisect
+from dvca_sumo.analysis.bisection import Bracket, Outcome, best_share, bisect
 from dvca_sumo.analysis.dtest import Dtest, Question
 from dvca_sumo.interventions import State
 from dvca_sumo.messages import Component, MessageId
@@ -23,7 +21,7 @@ class MessageAnswer(msgspec.Struct, frozen=True):
 
 
 def violation_inducing_message(
-    dtest: Dtest, record: Record, component: Component, time: float, *, is_exact: bool
+    dtest: Dtest, record: Record, component: Component, time: float, until: float, *, is_exact: bool
 ) -> MessageAnswer:
     """Bisect over the vehicle dynamic states of `component`'s messages, then over messages.
 
@@ -39,6 +37,7 @@ def violation_inducing_message(
         record: The factual run.
         component: The responsible one.
         time: [s] of the violation: a substitution after it is none.
+        until: [s] at which a safe run ends; inf: with the drive.
         is_exact: Whether runs repeat bit for bit.
     """
     marks = _marks(record, component, time)
@@ -48,16 +47,20 @@ def violation_inducing_message(
     def question(index: int) -> Question:
         return Question((component,), marks[index] if index > 0 else None)
 
-    def test_all(indices: Sequence[int]) -> list[Outcome]:
-        return dtest.ask_all([question(index) for index in indices])
+    def test(index: int) -> Outcome:
+        return dtest.ask(question(index))
 
     def known() -> dict[int, Outcome]:
         return {begins[index]: outcome for index, outcome in dtest.known(component).items()}
 
-    bracket = bisect(test_all, _bracket(known(), len(marks)), states)
+    bracket = _bracket(known(), len(marks))
+    begin = marks[bracket.low].time
+    # Branches run from where they substitute; runs from time 0 cost the same whatever the answer.
+    share = best_share(min(until, record.moments[-1].time) - begin, time - begin) if is_exact else 0.5
+    bracket = bisect(test, bracket, states, share)
     if is_exact:
-        bracket = bisect(test_all, bracket)
-    _ask_around(test_all, states, dtest.known(component), bracket)
+        bracket = bisect(test, bracket, share=share)
+    dtest.ask_all([question(one) for one in _around(states, dtest.known(component), bracket)])
     is_monotone = _is_monotone(known(), bracket)
     low = bracket.low
     if not is_exact:
@@ -104,13 +107,11 @@ def _are_neighbours(states: list[int], bracket: Bracket, count: int) -> bool:
     return not between
 
 
-def _ask_around(
-    test_all: Callable[[Sequence[int]], list[Outcome]], states: list[int], known: dict[int, Outcome], bracket: Bracket
-) -> None:
+def _around(states: list[int], known: dict[int, Outcome], bracket: Bracket) -> list[int]:
     """One state to either side, where nothing farther out was asked before."""
     before = [one for one in states if 0 < one < bracket.low] if min(known) >= bracket.low else []
     after = [one for one in states if one > bracket.high] if max(known) <= bracket.high else []
-    test_all([*before[-1:], *after[:1]])
+    return [*before[-1:], *after[:1]]
 
 
 def _is_monotone(known: dict[int, Outcome], bracket: Bracket) -> bool:

@@ -176,7 +176,7 @@ class ForkEngine:
         if starts:
             change = float(math.ceil(min(starts) / TICK - 1e-6) // _TICKS_PER_STEP)
         else:
-            change = max(self._before_violation(), default=0.0)
+            change = min(self._before_violation(), default=0.0)
         return int(max(min(change, *ends), 0.0))
 
     def _landmarks(self, task: Task, latest: int) -> Sequence[int]:

@@ -100,6 +100,11 @@ class Drive:
         """World steps driven so far."""
         return self._tick // TICKS_PER_STEP
 
+    @property
+    def has_violated(self) -> bool:
+        """Whether an oracle has found a violation so far."""
+        return not math.isinf(self._breach)
+
     def branch(self, task: Task) -> None:
         """Go on under another task; interventions that both have keep what they remember."""
         for component in COMPONENTS:

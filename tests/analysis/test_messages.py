@@ -40,7 +40,7 @@ def found(
     engine = FakeEngine(answers)
     dtest = asking(engine, jitters=(None,) if is_exact else (0, 1, 2))
     assert dtest.ask(Question((component,))) is Outcome.SAFE
-    return violation_inducing_message(dtest, record, component, CRASH.time, is_exact=is_exact), dtest
+    return violation_inducing_message(dtest, record, component, CRASH.time, math.inf, is_exact=is_exact), dtest
 
 
 def by_index(record: Record, answer: Callable[[int], Glimpse | Failure]) -> Answers:
@@ -91,7 +91,7 @@ def test_four_thousand_messages_cost_at_most_sixteen_probes(last: int) -> None:
     engine = FakeEngine(needing(LONG_DRIVE, CONTROL, last, crash))
     dtest = asking(engine)
     dtest.ask(Question((CONTROL,)))
-    answer = violation_inducing_message(dtest, LONG_DRIVE, CONTROL, crash.time, is_exact=True)
+    answer = violation_inducing_message(dtest, LONG_DRIVE, CONTROL, crash.time, math.inf, is_exact=True)
     assert len(LONG_DRIVE.executions[CONTROL]) == 4000
     assert answer.last_safe.index == last
     assert len(engine.tasks) <= 1 + 16
@@ -101,7 +101,7 @@ def test_what_is_known_already_is_where_the_search_begins() -> None:
     engine = FakeEngine(needing(DRIVE, PERCEPTION, 33, CRASH))
     dtest = asking(engine)
     dtest.ask_all([Question((PERCEPTION,), DRIVE.mark(MessageId(PERCEPTION, index))) for index in (20, 30, 35, 40)])
-    answer = violation_inducing_message(dtest, DRIVE, PERCEPTION, CRASH.time, is_exact=True)
+    answer = violation_inducing_message(dtest, DRIVE, PERCEPTION, CRASH.time, math.inf, is_exact=True)
     assert answer.last_safe.index == 33
     assert len(engine.tasks) <= 4 + math.ceil(math.log2(5)) + 2
 
@@ -111,7 +111,7 @@ def test_a_long_standstill_is_one_state_and_costs_its_own_logarithm_only() -> No
     engine = FakeEngine(needing(record, CONTROL, 3000, CRASH))
     dtest = asking(engine)
     dtest.ask(Question((CONTROL,)))
-    violation_inducing_message(dtest, record, CONTROL, START + 40.0, is_exact=True)
+    violation_inducing_message(dtest, record, CONTROL, START + 40.0, math.inf, is_exact=True)
     states, longest = 21, 3600
     rounds = math.ceil(math.log(states + 1, 3)) + math.ceil(math.log(longest + 1, 3))
     assert len(engine.tasks) <= 1 + 2 * rounds + 2
@@ -133,7 +133,7 @@ def test_an_outcome_that_is_not_monotone_where_it_was_asked_is_noticed_and_the_e
     answers = by_index(DRIVE, lambda index: VIOLATING if (index >= 30) != (index in odd) else SAFE)
     dtest = asking(FakeEngine(answers))
     dtest.ask_all([Question((PERCEPTION,), DRIVE.mark(MessageId(PERCEPTION, index))) for index in (0, 26, 28, 31, 33)])
-    answer = violation_inducing_message(dtest, DRIVE, PERCEPTION, CRASH.time, is_exact=True)
+    answer = violation_inducing_message(dtest, DRIVE, PERCEPTION, CRASH.time, math.inf, is_exact=True)
     assert not answer.is_monotone
     assert "not monotone" in answer.note
     assert ends(dtest, answer) == [Outcome.SAFE, Outcome.VIOLATES]
