@@ -19,6 +19,7 @@ from dvca_sumo.engine.replay import ReplayEngine
 from dvca_sumo.messages import Component
 from dvca_sumo.run import Task
 from dvca_sumo.stack.reference import StackError
+from dvca_sumo.stack.sources import StackSource
 
 LOCALIZATION, PERCEPTION, PREDICTION = Component.LOCALIZATION, Component.PERCEPTION, Component.PREDICTION
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells a process of its parent's death")
@@ -220,7 +221,6 @@ from pathlib import Path
 import forking_stacks
 from forked_drives import factual, fork_engine, glimpses, ideal
 from dvca_sumo.messages import Component
-from dvca_sumo.stack.sources import StackSource
 
 def main():
     forking_stacks.told, forking_stacks.analysis = int(sys.argv[3]), os.getpid()
