@@ -25,6 +25,7 @@ from dvca_sumo.interventions import Ideal, Selection, fault_library, planted_fau
 from dvca_sumo.record import Record
 from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import Scenario
+from dvca_sumo.stack.sources import StackSource
 
 BUILT_IN = [f"nets/cs{number}.sumocfg" for number in range(1, 6)]
 BEFORE = (0.5, 2.0, 8.0)  # [s]
@@ -50,7 +51,7 @@ def main() -> None:
 
 
 def _compared(scenario: Scenario, fault: str, jobs: int) -> bool:
-    engine = ForkEngine(scenario.configuration.net, None, jobs)
+    engine = ForkEngine(scenario.configuration.net, StackSource(), jobs)
     try:
         task = Task(scenario, (planted_fault(fault),), StopRule(after_contact=AFTER))
         record = engine.record(task)

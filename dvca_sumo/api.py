@@ -20,6 +20,7 @@ from dvca_sumo.interventions import planted_fault
 from dvca_sumo.record import Record
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.scenario import load_scenario as _load_scenario
+from dvca_sumo.stack.sources import StackSource
 
 CPUS = os.cpu_count() or 1
 ENGINES: dict[str, type[ForkEngine] | type[ReplayEngine]] = {"fork": ForkEngine, "replay": ReplayEngine}
@@ -32,6 +33,7 @@ class FactualDrive(msgspec.Struct, frozen=True):
     request: Request
     engine: Engine
     record: Record
+    bug: str | None = None  # that the reference stack was built with
 
 
 def load_scenario(
@@ -52,6 +54,7 @@ def drive(
     repeats: int | None = None,
     jobs: int = CPUS,
     engine: str | None = None,
+    bug: str | None = None,
 ) -> FactualDrive:
     """Drive a scenario once; arguments are those of the command line.
 
@@ -63,15 +66,16 @@ def drive(
         jobs: Runs at once during attribution.
         engine: "fork" or "replay"; None is fork where the system can, which also is kept alive until
             `attribute` is done or the drive is forgotten.
+        bug: Word of `--bug`: a real bug that the reference stack is to have.
 
     Raises:
-        ScenarioError, FaultError, StackError, RoadMapError: Bad input, in one line.
+        ScenarioError, FaultError, StackError, BugError, RoadMapError: Bad input, in one line.
         RunFailedError: The run's process crashed or hung.
     """
     request = Request(scenario, tuple(planted_fault(text) for text in faults), repeats)
-    chosen = ENGINES[engine or DEFAULT_ENGINE](scenario.configuration.net, stack, jobs)
+    chosen = ENGINES[engine or DEFAULT_ENGINE](scenario.configuration.net, StackSource(stack, bug), jobs)
     try:
-        return FactualDrive(request, chosen, factual_run(chosen, request))
+        return FactualDrive(request, chosen, factual_run(chosen, request), bug)
     except BaseException:
         chosen.close()
         raise

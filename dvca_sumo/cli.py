@@ -23,7 +23,9 @@ from dvca_sumo.report.result import Json, Timing, result_of
 from dvca_sumo.report.terminal import verdict_text
 from dvca_sumo.roadmap import RoadMapError
 from dvca_sumo.scenario import ScenarioError
+from dvca_sumo.stack.bugs import BUGS, BugError
 from dvca_sumo.stack.reference import StackError
+from dvca_sumo.stack.sources import StackSource
 
 _REPEATS = 3
 
@@ -75,6 +77,7 @@ def program() -> None:
 @program.command()
 @click.argument("sumocfg", type=click.Path(path_type=Path))
 @click.option("--fault", "faults", multiple=True, metavar="NAME[:key=value,...]", help="Plant a fault; see `faults`.")
+@click.option("--bug", metavar="NAME", help="A real bug for the reference stack to have; see `faults`.")
 @click.option("--ego", metavar="ID|auto", help="The ego's vehicle id, or auto to pick one.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="For SUMO's drivers and the ADS's sensors.")
 @click.option("--stack", metavar="MODULE:FACTORY|FILE.toml", help="Your own stack, or parameters of the reference one.")
@@ -90,6 +93,7 @@ def program() -> None:
 def run(
     sumocfg: Path,
     faults: tuple[str, ...],
+    bug: str | None,
     ego: str | None,
     seed: int | None,
     stack: str | None,
@@ -114,11 +118,13 @@ def run(
     """
     if repeats is not None and not jitter:
         raise click.UsageError("--repeats goes with --jitter: in exact mode every run is the same")
+    if bug is not None and not StackSource(stack).is_reference:
+        raise click.UsageError("--bug is a switch of the reference stack: it does not go with --stack MODULE:FACTORY")
     if output is not None:
         _make(output)
     terminal = _Terminal(jobs)
     scenario = load_scenario(sumocfg, ego, seed, begin, end)
-    drive = api.drive(scenario, faults, stack, (repeats or _REPEATS) if jitter else None, jobs, engine)
+    drive = api.drive(scenario, faults, stack, (repeats or _REPEATS) if jitter else None, jobs, engine, bug)
     terminal.factual(drive.record)
     if drive.engine.fallback is not None:
         _tell(f"engine {drive.engine.name}: {drive.engine.fallback}")
@@ -133,7 +139,7 @@ def run(
 
 @program.command()
 def faults() -> None:
-    """List the fault library: name, component, parameters with units."""
+    """List the fault library (name, component, parameters with units), and the real bugs."""
     for name, entry in fault_library().items():
         click.echo(f"{name}  ({entry.component.value})\n    {entry.summary}")
         for key, parameter in entry.parameters.items():
@@ -141,6 +147,9 @@ def faults() -> None:
     click.echo("every fault")
     for key, parameter in COMMON.items():
         click.echo(f"    {_described(key, parameter)}")
+    click.echo("real bugs, for --bug")
+    for name, bug in BUGS.items():
+        click.echo(f"{name}  ({bug.component.value})\n    {bug.summary}\n    {bug.source}")
 
 
 def main() -> NoReturn:
@@ -153,7 +162,7 @@ def main() -> NoReturn:
     except click.ClickException as error:
         _tell(f"error: {error.format_message()}")
         _leave(ExitCode.USAGE)
-    except (ScenarioError, FaultError, StackError, RoadMapError) as error:
+    except (ScenarioError, FaultError, StackError, BugError, RoadMapError) as error:
         _tell(f"error: {error}")
         _leave(ExitCode.BAD_INPUT)
     except RunFailedError as error:
@@ -171,10 +180,10 @@ def main() -> NoReturn:
 
 
 def _publish(drive: FactualDrive, found: Attribution, timing: Timing, output: Path | None, *, as_json: bool) -> None:
-    result = result_of(drive.request.scenario, drive.request.faults, found, timing)
+    result = result_of(drive.request.scenario, drive.request.faults, found, timing, drive.bug)
     if output is not None:
         _write(output / "result.json", result)
-    click.echo(json.dumps(result, indent=1) if as_json else verdict_text(found, timing))
+    click.echo(json.dumps(result, indent=1) if as_json else verdict_text(found, timing, drive.bug))
 
 
 def _make(folder: Path) -> None:

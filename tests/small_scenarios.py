@@ -10,6 +10,7 @@ from dvca_sumo.interventions import Futures, Intervention
 from dvca_sumo.record import Record
 from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import load_scenario
+from dvca_sumo.stack.sources import StackSource
 
 Answer = TypeVar("Answer")
 
@@ -52,5 +53,5 @@ def driven(
 ) -> Record:
     """One run of the scenario at `config`."""
     scenario = load_scenario(config, ego, seed)
-    engine = ReplayEngine(scenario.configuration.net, stack, 1, TIMEOUT)
+    engine = ReplayEngine(scenario.configuration.net, StackSource(stack), 1, TIMEOUT)
     return engine.record(Task(scenario, interventions, stop, futures, jitter))

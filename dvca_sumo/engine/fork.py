@@ -29,7 +29,7 @@ from dvca_sumo.engine.replay import DEFAULT_TIMEOUT, ReplayEngine, raised, roadm
 from dvca_sumo.interventions import Fault, Ideal
 from dvca_sumo.record import TICK, Record
 from dvca_sumo.run import Task
-from dvca_sumo.stack.reference import stack_factory
+from dvca_sumo.stack.sources import StackSource, stack_factory
 
 IS_AVAILABLE = sys.platform != "win32"
 
@@ -41,20 +41,20 @@ _BEFORE_VIOLATION = (1, 2, 4)  # [s] where the premise's branch leaves checkpoin
 class ForkEngine:
     """Branches off parked copies of the factual run."""
 
-    def __init__(self, net: Path, stack: str | None, jobs: int, timeout: float = DEFAULT_TIMEOUT) -> None:
+    def __init__(self, net: Path, source: StackSource, jobs: int, timeout: float = DEFAULT_TIMEOUT) -> None:
         """As `ReplayEngine`, which it falls back to.
 
         Raises:
             RoadMapError: The net cannot be read.
-            StackError: The stack cannot be read or imported.
+            StackError, BugError: The stack cannot be read or imported.
         """
         self.name = "fork"
         self.fallback: str | None = None
         self.jobs = jobs
-        self.witness = ReplayEngine(net, stack, jobs, timeout)
+        self.witness = ReplayEngine(net, source, jobs, timeout)
         self.roadmap = self.witness.roadmap
         self._net = net
-        self._stack = stack
+        self._source = source
         self._timeout = timeout
         self._grove: Grove | None = None
         self._end: Callable[[], object] = lambda: None
@@ -106,7 +106,7 @@ class ForkEngine:
             self._fall_back("this system cannot copy a process")
         else:
             try:
-                self._grove = Grove(partial(_hold, self._net, self._stack, task))
+                self._grove = Grove(partial(_hold, self._net, self._source, task))
             except OSError as error:
                 self._fall_back(f"the system gives no process or socket: {error}")
             else:
@@ -193,5 +193,5 @@ def _step(elapsed: float) -> float:
     return elapsed if math.isinf(elapsed) else math.floor(elapsed / (_TICKS_PER_STEP * TICK) + 1e-6)
 
 
-def _hold(net: Path, stack: str | None, task: Task, address: str, folder: Path, connection: Connection) -> NoReturn:
-    Holder(address, folder, connection).hold(task, partial(roadmap, net), stack_factory(stack))
+def _hold(net: Path, source: StackSource, task: Task, address: str, folder: Path, connection: Connection) -> NoReturn:
+    Holder(address, folder, connection).hold(task, partial(roadmap, net), stack_factory(source))

@@ -12,7 +12,8 @@ from dvca_sumo.record import Record
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.run import Task, rtest
 from dvca_sumo.scenario import ScenarioError
-from dvca_sumo.stack.reference import StackError, stack_factory
+from dvca_sumo.stack.reference import StackError
+from dvca_sumo.stack.sources import StackSource, stack_factory
 
 DEFAULT_TIMEOUT = 600.0  # [s] of wall time for one run
 
@@ -23,20 +24,20 @@ class ReplayEngine:
     name = "replay"
     fallback: str | None = None
 
-    def __init__(self, net: Path, stack: str | None, jobs: int, timeout: float = DEFAULT_TIMEOUT) -> None:
-        """An engine for scenarios on one net, with one stack (`--stack`'s word).
+    def __init__(self, net: Path, source: StackSource, jobs: int, timeout: float = DEFAULT_TIMEOUT) -> None:
+        """An engine for scenarios on one net, with one stack.
 
         Raises:
             RoadMapError: The net cannot be read.
-            StackError: The stack cannot be read or imported.
+            StackError, BugError: The stack cannot be read or imported.
         """
         self.jobs = jobs
         self._net = net
-        self._stack = stack
+        self._source = source
         self._timeout = timeout
         # Loaded before any process starts: a forked child finds both in its cache.
         self.roadmap = roadmap(net, "passenger")
-        stack_factory(stack)
+        stack_factory(source)
 
     @property
     def witness(self) -> "ReplayEngine":
@@ -45,7 +46,7 @@ class ReplayEngine:
 
     def record(self, task: Task) -> Record:
         """See `Engine`."""
-        job = partial(_rtest, self._net, self._stack, task)
+        job = partial(_rtest, self._net, self._source, task)
         ((_, answer),) = isolated([job], 1, self._timeout)
         if isinstance(answer, Failure):
             raise raised(answer)
@@ -55,7 +56,7 @@ class ReplayEngine:
         self, tasks: Sequence[Task], on_result: Callable[[int, Glimpse | Failure], None]
     ) -> list[Glimpse | Failure]:
         """See `Engine`."""
-        jobs = [partial(_glimpse, self._net, self._stack, task) for task in tasks]
+        jobs = [partial(_glimpse, self._net, self._source, task) for task in tasks]
         answers: dict[int, Glimpse | Failure] = {}
         for row, answer in isolated(jobs, self.jobs, self._timeout):
             answers[row] = answer
@@ -72,17 +73,17 @@ def roadmap(net: Path, vehicle_class: str) -> RoadMap:
     return RoadMap.load(net, vehicle_class)
 
 
-def _rtest(net: Path, stack: str | None, task: Task) -> Record:
-    return rtest(task, partial(roadmap, net), stack_factory(stack))
+def _rtest(net: Path, source: StackSource, task: Task) -> Record:
+    return rtest(task, partial(roadmap, net), stack_factory(source))
 
 
-def _glimpse(net: Path, stack: str | None, task: Task) -> Glimpse:
-    return settled(task, partial(_pass, net, stack))
+def _glimpse(net: Path, source: StackSource, task: Task) -> Glimpse:
+    return settled(task, partial(_pass, net, source))
 
 
-def _pass(net: Path, stack: str | None, task: Task) -> Pass:
+def _pass(net: Path, source: StackSource, task: Task) -> Pass:
     begin = time.perf_counter()
-    record = _rtest(net, stack, task)
+    record = _rtest(net, source, task)
     return summary(task, record, record.simulated, time.perf_counter() - begin)
 
 

@@ -27,7 +27,9 @@ class Timing(msgspec.Struct, frozen=True):
     jobs: int
 
 
-def result_of(scenario: Scenario, faults: tuple[Fault, ...], found: Attribution, timing: Timing) -> Json:
+def result_of(
+    scenario: Scenario, faults: tuple[Fault, ...], found: Attribution, timing: Timing, bug: str | None = None
+) -> Json:
     """The whole result, of JSON types only."""
     record = found.record
     counts = record.message_counts
@@ -48,6 +50,7 @@ def result_of(scenario: Scenario, faults: tuple[Fault, ...], found: Attribution,
             "thresholds": {name: _finite(value) for name, value in msgspec.structs.asdict(record.thresholds).items()},
         },
         "faults": [_fault(fault) for fault in faults],
+        "bug": bug,
         "violations": [_violation(violation) for violation in record.violations],
         "judgements": [
             {"kind": one.kind, "answer": one.answer.value, "reason": one.reason} for one in record.judgements

@@ -10,6 +10,7 @@ from dvca_sumo.analysis.dtest import Probe
 from dvca_sumo.interventions import UNITS
 from dvca_sumo.record import MessageMark, Record
 from dvca_sumo.report.result import Timing
+from dvca_sumo.stack.bugs import BUGS
 from dvca_sumo.violations import Contact, Violation
 
 _CONTACTS = {
@@ -25,12 +26,12 @@ _ANSWERS = {
 }
 
 
-def verdict_text(found: Attribution, timing: Timing) -> str:
+def verdict_text(found: Attribution, timing: Timing, bug: str | None = None) -> str:
     """The whole verdict as lines of plain text, without a trailing newline."""
-    return "\n".join(_lines(found, timing))
+    return "\n".join(_lines(found, timing, bug))
 
 
-def _lines(found: Attribution, timing: Timing) -> Iterator[str]:
+def _lines(found: Attribution, timing: Timing, bug: str | None) -> Iterator[str]:
     record = found.record
     if found.violation is None:
         said = "No violation" if found.verdict is Verdict.NONE else "No violation seen, but it could not be told"
@@ -39,6 +40,8 @@ def _lines(found: Attribution, timing: Timing) -> Iterator[str]:
             yield f"  because  {found.reason}"
         if found.planted is not None:
             yield f"  planted  {_altered(found.planted)}, to no violation"
+        if bug is not None:
+            yield f"  bug      {bug} ({BUGS[bug].component.value}), to no violation"
         yield _cost(found, timing)
         return
     yield from _what_happened(found.violation, record)
@@ -46,6 +49,7 @@ def _lines(found: Attribution, timing: Timing) -> Iterator[str]:
     yield from _which_message(found)
     yield from _certificate(found)
     yield from _planted(found)
+    yield from _built_with(found, bug)
     yield _cost(found, timing)
 
 
@@ -132,6 +136,15 @@ def _planted(found: Attribution) -> Iterator[str]:
     which = "one that the fault altered" if planted.message_success else "NOT one that the fault altered"
     tail = f"; the message is {which}" if found.message is not None else ""
     yield f"PLANTED    {_altered(planted)}: component {hit}{tail}"
+
+
+def _built_with(found: Attribution, bug: str | None) -> Iterator[str]:
+    if bug is None:
+        return
+    component = BUGS[bug].component
+    named = found.components.component if found.components is not None else None
+    yield ""
+    yield f"BUG        {bug} ({component.value}): component {'found' if named is component else 'NOT found'}"
 
 
 def _altered(planted: Planted) -> str:

@@ -22,7 +22,9 @@ class Lane(msgspec.Struct, frozen=True, eq=False, gc=False):
     line: Polyline  # centre line in driving direction, as long as the drawn lane
     length: float  # [m] as SUMO counts lane positions: may differ from line.length
     width: float  # [m]
-    speed_limit: float  # [m/s]
+    speed_limit: float  # [m/s] by law
+    is_limit_mapped: bool  # whether the map that an ADS drives on has the limit, too
+    is_motorway: bool
     is_internal: bool  # on a junction
     is_crossing: bool  # for pedestrians across the road
     is_drivable: bool  # for the vehicle class the map was loaded for

@@ -16,6 +16,8 @@ from dvca_sumo.geometry.polyline import Floats, Polyline
 from dvca_sumo.roadmap.lanes import Junction, Lane, Movement, RoadMapError
 
 _ROAD = ("", "internal")  # edge functions with traffic along them
+_MOTORWAYS = ("highway.motorway", "highway.trunk")  # SUMO's types of edges imported from OpenStreetMap
+_LIMIT_KEY, _MISSING = "dvca.map.speed_limit", "missing"  # parameter of an edge: a gap in the map an ADS drives on
 _STUB = 0.01  # [m] length given to a lane drawn as a single point
 
 
@@ -98,6 +100,8 @@ def _lanes(edge: Any, vehicle_class: str, *, is_left_hand: bool) -> Iterator[Lan
             length=lane.getLength(),
             width=lane.getWidth(),
             speed_limit=lane.getSpeed(),
+            is_limit_mapped=edge.getParam(_LIMIT_KEY) != _MISSING,
+            is_motorway=(edge.getType() or "").startswith(_MOTORWAYS),
             is_internal=edge.getFunction() == "internal",
             is_crossing=edge.getFunction() == "crossing",
             is_drivable=drivable[index],

@@ -43,6 +43,14 @@ class Crossing(msgspec.Struct, frozen=True, eq=False):
     end_station: float  # [m]
 
 
+class UnmappedLimit(msgspec.Struct, frozen=True, eq=False):
+    """A stretch whose speed limit the map that the ego drives on does not have."""
+
+    start_station: float  # [m]
+    end_station: float  # [m]
+    is_motorway: bool
+
+
 class Route(msgspec.Struct, frozen=True, eq=False):
     """The ego's reference line and everything known along it.
 
@@ -52,7 +60,7 @@ class Route(msgspec.Struct, frozen=True, eq=False):
 
     line: Polyline  # through lanes and junctions, lane changes blended in
     lane_ids: tuple[str, ...]
-    speed_limits: Floats  # [m/s]
+    speed_limits: Floats  # [m/s] by law
     curvatures: Floats  # [1/m]
     lane_left: Floats  # [m] edges of the lane, of both lanes during a lane change
     lane_right: Floats  # [m]
@@ -62,3 +70,4 @@ class Route(msgspec.Struct, frozen=True, eq=False):
     destination: float  # [m] where the front bumper shall stop
     stop_lines: tuple[StopLine, ...]  # by station
     crossings: tuple[Crossing, ...]  # by station
+    unmapped_limits: tuple[UnmappedLimit, ...] = ()  # by station

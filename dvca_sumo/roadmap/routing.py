@@ -12,7 +12,7 @@ from dvca_sumo.roadmap.lane_sequence import Leg, change_length, lane_sequence
 from dvca_sumo.roadmap.lanes import Lane, Movement
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.right_of_way import crossings, stop_line
-from dvca_sumo.roadmap.route import Route, RouteError
+from dvca_sumo.roadmap.route import Route, RouteError, UnmappedLimit
 from dvca_sumo.roadmap.smoothing import smoothed
 
 _BEFORE = 20.0  # [m] of lane shown behind the start, as far as there is any
@@ -55,7 +55,8 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
     owners = np.searchsorted([stretch.begin for stretch in plan.stretches], along, side="right") - 1
     followed = [plan.stretches[owner].lane for owner in np.maximum(owners, 0)]
     changes = [Change(change.lanes, moved(change.begin), moved(change.end)) for change in plan.changes]
-    edges_of = bounds(net.lanes, line, list(_runs(followed)), changes)
+    runs = list(_runs(followed))
+    edges_of = bounds(net.lanes, line, runs, changes)
     passages = [
         _Passage(passage.movement, moved(passage.begin), moved(passage.end))
         for passage in plan.passages
@@ -74,6 +75,11 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
         destination=moved(plan.destination),
         stop_lines=tuple(stop_line(net, p.movement, p.begin, p.end) for p in passages),
         crossings=tuple(crossing for p in passages for crossing in crossings(net, p.movement, line, p.begin, p.end)),
+        unmapped_limits=tuple(
+            UnmappedLimit(float(line.stations[rows.start]), float(line.stations[rows.stop - 1]), lane.is_motorway)
+            for lane, rows in runs
+            if not lane.is_limit_mapped
+        ),
     )
 
 

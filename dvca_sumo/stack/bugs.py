@@ -25,7 +25,32 @@ class Bug(msgspec.Struct, frozen=True):
     switches: dict[str, bool | float]  # field of the component's configuration -> its value in the buggy build
 
 
-BUGS: dict[str, Bug] = {}
+BUGS: dict[str, Bug] = {
+    "apollo-6826": Bug(
+        component=Component.PLANNING,
+        summary="decides to pass an object by the free width of the lane, never by the distance to its own path",
+        source="Apollo pull request 6826 (4a9a7f0c5, 2019-02-12)",
+        switches={"trusts_lane_room": True},
+    ),
+    "apollo-3257": Bug(
+        component=Component.PLANNING,
+        summary="stops with its rear axle at the stop line: the front overhang is not subtracted",
+        source="Apollo pull request 3257 (a1cff5e9b, 2018-03-07)",
+        switches={"lines_at_rear_axle": True},
+    ),
+    "apollo-10706": Bug(
+        component=Component.PLANNING,
+        summary="drives at the planner's upper bound where the map has no speed limit, not at the road type's default",
+        source="Apollo pull request 10706 (2020)",
+        switches={"unmapped_at_bound": True},
+    ),
+    "apollo-cc890a4": Bug(
+        component=Component.PLANNING,
+        summary="stops 5 m past the near end of an object that stands in the way: the stop distance has the wrong sign",
+        source="Apollo commit cc890a4eb (2017-08-14)",
+        switches={"stops_past_objects": True},
+    ),
+}
 
 
 def build_with(name: str, config: StackConfig) -> StackConfig:

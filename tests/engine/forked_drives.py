@@ -18,6 +18,7 @@ from dvca_sumo.interventions import Ideal, Intervention, Selection
 from dvca_sumo.messages import COMPONENTS, Component
 from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import load_scenario
+from dvca_sumo.stack.sources import StackSource
 
 SUBSTITUTABLE = tuple(component for component in COMPONENTS if component is not Component.PLANNING)
 FOLLOWER = '<vehicle id="behind" depart="0" departPos="8" departSpeed="10"><route edges="bc"/></vehicle>'
@@ -52,7 +53,7 @@ def assert_as_replayed(engine: ForkEngine, net: Path, stack: str | None, *tasks:
     """Bit for bit, and really branched."""
     assert engine.fallback is None
     branched = glimpses(engine, *tasks)
-    assert outcomes(branched) == outcomes(glimpses(ReplayEngine(net, stack, 2, TIMEOUT), *tasks))
+    assert outcomes(branched) == outcomes(glimpses(ReplayEngine(net, StackSource(stack), 2, TIMEOUT), *tasks))
 
 
 class Alive:
@@ -77,7 +78,7 @@ def fork_engine(
     alive = Alive()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(branching, "SPACING", spacing)
-        engine = ForkEngine(net, stack, jobs, timeout)
+        engine = ForkEngine(net, StackSource(stack), jobs, timeout)
         try:
             yield engine
         finally:

@@ -19,6 +19,7 @@ from dvca_sumo.engine.replay import ReplayEngine
 from dvca_sumo.messages import Component
 from dvca_sumo.run import Task
 from dvca_sumo.stack.reference import StackError
+from dvca_sumo.stack.sources import StackSource
 
 LOCALIZATION, PERCEPTION, PREDICTION = Component.LOCALIZATION, Component.PERCEPTION, Component.PREDICTION
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells a process of its parent's death")
@@ -102,7 +103,7 @@ def test_a_branch_that_hangs_is_ended(task: Task, street: Path, told: int, compo
 def test_a_failure_is_told_as_the_replay_engine_tells_it(task: Task, street: Path) -> None:
     for stack in ("crashing", "raising"):
         asked = ideal(task, 2.0, PERCEPTION)
-        (replayed,) = glimpses(ReplayEngine(street, f"forking_stacks:{stack}", 1, TIMEOUT), asked)
+        (replayed,) = glimpses(ReplayEngine(street, StackSource(f"forking_stacks:{stack}"), 1, TIMEOUT), asked)
         with fork_engine(street, f"forking_stacks:{stack}") as engine:
             branched = failing(engine, task)
         assert isinstance(replayed, Failure)
@@ -187,7 +188,7 @@ def test_a_listener_that_raises_ends_the_branches_and_leaves_an_engine_that_answ
 
 def test_an_engine_that_is_forgotten_ends_its_processes(task: Task, street: Path) -> None:
     alive = Alive()
-    engine = ForkEngine(street, None, 2, TIMEOUT)
+    engine = ForkEngine(street, StackSource(), 2, TIMEOUT)
     engine.record(task)
     (process, *_) = engine.checkpoint_processes
     del engine

@@ -15,6 +15,7 @@ from dvca_sumo.roadmap import RoadMapError
 from dvca_sumo.run import Task
 from dvca_sumo.scenario import ScenarioError, load_scenario
 from dvca_sumo.stack.reference import StackError
+from dvca_sumo.stack.sources import StackSource
 
 FAR = EGO.replace('depart="0"', 'depart="590"')
 LATE = "".join(f'<vehicle id="v{time}" depart="{time}"><route edges="nb bs"/></vehicle>' for time in range(0, 580, 20))
@@ -26,7 +27,7 @@ def tasks(config: Path, *seeds: int) -> list[Task]:
 
 def test_a_glimpse_is_of_the_same_run_as_a_record(tmp_path: Path, street: Path) -> None:
     config = scenario_file(tmp_path, street)
-    engine = ReplayEngine(street, None, 1, TIMEOUT)
+    engine = ReplayEngine(street, StackSource(), 1, TIMEOUT)
     (task,) = tasks(config, 3)
     record = engine.record(task)
     (glimpse,) = engine.glimpses([task], lambda _row, _answer: None)
@@ -41,7 +42,7 @@ def test_glimpses_come_in_the_order_of_their_tasks_and_are_heard_of_as_they_fini
     tmp_path: Path, street: Path
 ) -> None:
     heard: dict[int, Glimpse | Failure] = {}
-    engine = ReplayEngine(street, None, 2, TIMEOUT)
+    engine = ReplayEngine(street, StackSource(), 2, TIMEOUT)
     found = engine.glimpses(tasks(scenario_file(tmp_path, street), 1, 2, 1), heard.__setitem__)
     digests = [one.digest for one in found if isinstance(one, Glimpse)]
     assert len(digests) == 3
@@ -50,7 +51,7 @@ def test_glimpses_come_in_the_order_of_their_tasks_and_are_heard_of_as_they_fini
 
 
 def test_a_crash_costs_its_own_run_alone(tmp_path: Path, street: Path) -> None:
-    engine = ReplayEngine(street, "small_stacks:crashing_by_seed", 2, TIMEOUT)
+    engine = ReplayEngine(street, StackSource("small_stacks:crashing_by_seed"), 2, TIMEOUT)
     found = engine.glimpses(tasks(scenario_file(tmp_path, street), 1, CRASHING_SEED, 2), lambda _row, _answer: None)
     assert [type(one) for one in found] == [Glimpse, Failure, Glimpse]
     crashed = found[1]
@@ -73,7 +74,7 @@ def test_a_stack_that_leaves_is_a_failed_run(tmp_path: Path, street: Path) -> No
 def test_a_hanging_stack_is_ended(tmp_path: Path, street: Path) -> None:
     (task,) = tasks(scenario_file(tmp_path, street), 1)
     with pytest.raises(RunFailedError, match=r"no answer within 0\.6 s"):
-        ReplayEngine(street, "small_stacks:hanging", 1, timeout=0.6).record(task)
+        ReplayEngine(street, StackSource("small_stacks:hanging"), 1, timeout=0.6).record(task)
 
 
 @pytest.mark.parametrize("component", COMPONENTS)
@@ -103,7 +104,7 @@ def test_a_component_that_answers_with_nonsense_is_named(tmp_path: Path, street:
 
 
 def test_a_failing_stack_is_an_unresolved_glimpse_with_its_reason(tmp_path: Path, street: Path) -> None:
-    engine = ReplayEngine(street, "small_stacks:raising_planning", 1, TIMEOUT)
+    engine = ReplayEngine(street, StackSource("small_stacks:raising_planning"), 1, TIMEOUT)
     (found,) = engine.glimpses(tasks(scenario_file(tmp_path, street), 1), lambda _row, _answer: None)
     assert isinstance(found, Failure)
     assert "planning raised ZeroDivisionError" in found.reason
@@ -189,7 +190,7 @@ def test_a_net_cut_short_is_refused_in_one_line(tmp_path: Path, street: Path) ->
 def test_an_ideal_prediction_is_repeated_until_it_comes_true(tmp_path: Path, street: Path) -> None:
     follower = '<vehicle id="behind" depart="0" departPos="8" departSpeed="13"><route edges="bc"/></vehicle>'
     config = scenario_file(tmp_path, street, EGO + follower)
-    engine = ReplayEngine(street, None, 1, TIMEOUT)
+    engine = ReplayEngine(street, StackSource(), 1, TIMEOUT)
     task = Task(load_scenario(config), (Ideal(Component.PREDICTION),))
     (found,) = engine.glimpses([task], lambda _row, _answer: None)
     assert isinstance(found, Glimpse)

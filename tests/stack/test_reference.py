@@ -11,11 +11,10 @@ from dvca_sumo.stack.reference import (
     StackConfig,
     StackContext,
     StackError,
-    built_checked,
     reference_stack,
-    stack_factory,
 )
 from dvca_sumo.stack.sensors import SensorConfig
+from dvca_sumo.stack.sources import StackSource, built_checked, stack_factory
 
 
 @pytest.fixture
@@ -32,8 +31,7 @@ def written(folder: Path, text: str) -> str:
 
 
 def test_without_a_word_it_is_the_reference_stack(context: StackContext) -> None:
-    assert stack_factory(None) is reference_stack
-    stack = reference_stack(context)
+    stack = stack_factory(StackSource())(context)
     assert isinstance(stack, Stack)
     assert stack.sensor_range == SensorConfig().far_range
 
@@ -45,13 +43,13 @@ def test_every_trip_gets_components_of_its_own(context: StackContext) -> None:
 
 
 def test_a_file_sets_any_parameter_and_leaves_the_others(tmp_path: Path, context: StackContext) -> None:
-    stack = stack_factory(written(tmp_path, "[sensors]\nfar_range = 45.0\n"))(context)
+    stack = stack_factory(StackSource(written(tmp_path, "[sensors]\nfar_range = 45.0\n")))(context)
     assert stack.sensor_range == 45.0
     assert type(stack.planning) is type(reference_stack(context).planning)
 
 
 def test_an_empty_file_is_the_reference_stack(tmp_path: Path, context: StackContext) -> None:
-    assert stack_factory(written(tmp_path, ""))(context).sensor_range == StackConfig().sensors.far_range
+    assert stack_factory(StackSource(written(tmp_path, "")))(context).sensor_range == StackConfig().sensors.far_range
 
 
 @pytest.mark.parametrize(
@@ -65,12 +63,12 @@ def test_an_empty_file_is_the_reference_stack(tmp_path: Path, context: StackCont
 )
 def test_a_file_that_holds_something_else_is_refused_with_file_and_field(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(StackError, match=rf"stack file .*stack\.toml: .*{words.removeprefix('stack.toml: ')}"):
-        stack_factory(written(tmp_path, text))
+        stack_factory(StackSource(written(tmp_path, text)))
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(StackError, match=r"stack file .*none\.toml cannot be read: No such file"):
-        stack_factory(str(tmp_path / "none.toml"))
+        stack_factory(StackSource(str(tmp_path / "none.toml")))
 
 
 @pytest.mark.parametrize(
@@ -86,14 +84,14 @@ def test_a_missing_file_is_refused(tmp_path: Path) -> None:
 )
 def test_a_factory_that_cannot_be_had_is_named_with_the_reason(word: str, words: str) -> None:
     with pytest.raises(StackError, match=words):
-        stack_factory(word)
+        stack_factory(StackSource(word))
 
 
 def test_a_module_that_breaks_while_it_is_imported_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "broken_stack.py").write_text("1 / 0\n")
     monkeypatch.chdir(tmp_path)
     with pytest.raises(StackError, match="'broken_stack:stack' cannot be imported: ZeroDivisionError"):
-        stack_factory("broken_stack:stack")
+        stack_factory(StackSource("broken_stack:stack"))
 
 
 def test_a_users_module_is_found_where_the_command_is_typed(
@@ -103,7 +101,7 @@ def test_a_users_module_is_found_where_the_command_is_typed(
         "from dvca_sumo.stack.reference import reference_stack\nmine = lambda context: reference_stack(context)\n"
     )
     monkeypatch.chdir(tmp_path)
-    assert isinstance(stack_factory("my_stack:mine")(context), Stack)
+    assert isinstance(stack_factory(StackSource("my_stack:mine"))(context), Stack)
 
 
 def test_a_factory_that_raises_is_named(context: StackContext) -> None:

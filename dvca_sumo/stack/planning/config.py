@@ -74,3 +74,14 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     unseen_reach: float = 20.0  # [m] beyond braking distance, where a signal should have been seen
     unseen_patience: float = 5.0  # [s] standing at a signal never seen before it is taken for dark
     sign_wait: float = 1.0  # [s] standing at a stop sign
+
+    # Where the map has no speed limit.
+    urban_limit: float = 13.89  # [m/s]
+    motorway_limit: float = 27.78  # [m/s]
+    speed_bound: float = 40.0  # [m/s] of the vehicle, whatever the road
+
+    # Real bugs (see stack/bugs.py): what the build does wrong.
+    trusts_lane_room: bool = False  # passes what leaves enough of the lane, however close the path runs
+    lines_at_rear_axle: bool = False  # takes the station of a stop line for where the rear axle is to stop
+    unmapped_at_bound: bool = False  # drives at `speed_bound` where the map has no limit
+    stops_past_objects: bool = False  # stops `object_gap` past the near end of what stands, not before it

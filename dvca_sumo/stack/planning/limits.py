@@ -75,7 +75,8 @@ def nearest_stop(
     if obstacle is not None:
         occupied_from = float(graph.low[obstacle, 0]) - shape.front
         label = f"stop behind {scene.ids[scene.owners[obstacle]]}"
-        stops.append(Stop(occupied_from - config.object_gap, config.object_gap - _GIVE_AT_OBJECT, label))
+        gap = -config.object_gap if config.stops_past_objects else config.object_gap
+        stops.append(Stop(occupied_from - gap, config.object_gap - _GIVE_AT_OBJECT, label))
     if leader is not None and max(leader.speeds[0], leader.speeds[_SOON_STEP]) < _TIMID:
         occupied_from = min(occupied_from, leader.rears[0])
     for line, distance, _, _ in views:

@@ -40,7 +40,7 @@ class Planner:
         self._config = config
         self._route = route
         self._shape = shape
-        self._reference = Reference(route, shape)
+        self._reference = Reference(route, shape, config)
         self._junctions = Junctions(route, config)
         self._nudging = NudgeDecider(shape, config)
         self._meetings = Meetings(shape, config)
@@ -91,7 +91,8 @@ class Planner:
         config, shape = self._config, self._shape
         window = self._reference.window(station, self._reach(station, start.speed))
         scene = scene_in(window, predicted, time, self._nudging.stood, config)
-        views = self._junctions.step(time, station + shape.front, station - shape.rear_overhang, start.speed, signals)
+        nose = station if config.lines_at_rear_axle else station + shape.front
+        views = self._junctions.step(time, nose, station - shape.rear_overhang, start.speed, signals)
         lateral = lateral_start(start, window, offset)
         nudges = self._nudging.step(Situation(time, start.speed, lateral, window, scene, views))
         path = path_along(window, start, lateral, [nudge.plateau for nudge in nudges], shape, config)

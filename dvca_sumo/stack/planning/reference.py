@@ -5,6 +5,7 @@ import numpy as np
 
 from dvca_sumo.messages import Floats, Integers, VehicleShape
 from dvca_sumo.roadmap.route import Route
+from dvca_sumo.stack.planning.config import PlanningConfig
 
 BEHIND = 20  # rows of a window that lie behind its origin
 _BEYOND = 400  # [m] straight continuation of the line past its end, so that a window is never cut
@@ -81,7 +82,7 @@ class Window(msgspec.Struct, frozen=True, eq=False):
 class Reference:
     """A route, prepared so that a window is cut out by slicing."""
 
-    def __init__(self, route: Route, shape: VehicleShape) -> None:
+    def __init__(self, route: Route, shape: VehicleShape, config: PlanningConfig) -> None:
         line = route.line
         stations = np.arange(-BEHIND - 2, line.length + _BEYOND)
         inside = np.clip(stations, 0.0, line.length)
@@ -97,7 +98,7 @@ class Reference:
             table[row] = np.interp(inside, line.stations, column)
         table[_CURVATURE, outside != 0.0] = 0.0
         body = (-shape.rear_overhang - 1.0, shape.front + 1.0)
-        table[_LIMIT] = _lowest_within(inside, line.stations, route.speed_limits, body)
+        table[_LIMIT] = _lowest_within(inside, line.stations, _limits(route, config), body)
         self._table = table
 
     def locate(self, x: float, y: float, near: float) -> tuple[float, float, float] | None:
@@ -135,6 +136,17 @@ class Reference:
         rows *= first - whole
         rows += low[:, : high.shape[1]]
         return Window(station, rows, *rows)
+
+
+def _limits(route: Route, config: PlanningConfig) -> Floats:
+    """The speed limit at each point of the line [m/s]; where the map has none, what the type of the road suggests."""
+    limits, stations = route.speed_limits.copy(), route.line.stations
+    for gap in route.unmapped_limits:
+        usual = config.motorway_limit if gap.is_motorway else config.urban_limit
+        limits[(stations >= gap.start_station) & (stations <= gap.end_station)] = (
+            config.speed_bound if config.unmapped_at_bound else usual
+        )
+    return limits
 
 
 def _lowest_within(stations: Floats, known: Floats, limits: Floats, reach: tuple[float, float]) -> Floats:

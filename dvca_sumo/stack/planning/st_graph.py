@@ -18,6 +18,7 @@ _BICYCLE, _PERSON = int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 _WALKS_ACROSS = 0.3  # [m/s] sideways
 _NEVER = 1e4  # [m] for places where there is no leader
 _ENDS = np.array([0.0, -1.0, 1.0])[:, None, None]  # an object's middle, near and far end, in half lengths
+_LANE_ROOM = 0.3  # [m] of lane beside the ego's width that is enough for `trusts_lane_room`
 _AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
 
 
@@ -55,8 +56,28 @@ def graph_of(
     low, high = centres - futures.half_lengths, centres + futures.half_lengths
     occupied = gaps < _margins(scene, window, crossings, config)[:, None]
     occupied &= (high > -shape.rear_overhang) & (futures.stations < count - 2)
+    if config.trusts_lane_room:
+        occupied[scene.moving :][_has_lane_room(scene, window, shape)] = False
     last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)
     return Graph(occupied, gaps, low, high, occupied.argmax(axis=1).tolist(), last.tolist())
+
+
+def _has_lane_room(scene: Scene, window: Window, shape: VehicleShape) -> Flags:
+    """Whether each future that stays, of what is neither person nor bicycle, leaves enough of the ego's lane beside it.
+
+    It leaves enough when it is not on the line, and off the lane or with a free strip beside it that the ego fits in.
+    """
+    futures, still = scene.futures, slice(scene.moving, None)
+    offsets, half_widths = futures.offsets[still, 0], futures.half_widths[still, 0]
+    rows = window.index(futures.stations[still, 0] + _ENDS[:, :, 0] * futures.half_lengths[still, 0])
+    lane_left, lane_right = window.lane_left[rows].min(axis=0), window.lane_right[rows].max(axis=0)
+    left, right = offsets + half_widths, offsets - half_widths
+    is_on_line = (left > 0.0) & (right < 0.0)
+    is_on_lane = (left > lane_right) & (right < lane_left)
+    is_narrow = np.maximum(lane_left - left, right - lane_right) < shape.width + _LANE_ROOM
+    classes = scene.classes[scene.owners[still]]
+    has_room: Flags = ~(is_on_line | (is_on_lane & is_narrow)) & (classes != _PERSON) & (classes != _BICYCLE)
+    return has_room
 
 
 def _margins(scene: Scene, window: Window, crossings: tuple[Crossing, ...], config: PlanningConfig) -> Floats:

@@ -101,7 +101,7 @@ def test_same_input_gives_the_same_trajectories() -> None:
 
 def test_window_projects_like_the_line_itself() -> None:
     route = road(curve_points(12.0))
-    window = Reference(route, SHAPE).window(90.3, 80.0)
+    window = Reference(route, SHAPE, PlanningConfig()).window(90.3, 80.0)
     draws = np.random.default_rng(1)
     stations, sideways = draws.uniform(75.0, 165.0, 400), draws.uniform(-6.0, 6.0, 400)
     points = route.line.poses(stations, sideways)
@@ -112,7 +112,7 @@ def test_window_projects_like_the_line_itself() -> None:
 
 
 def test_window_tells_points_beyond_its_ends_from_points_on_the_line() -> None:
-    window = Reference(road(), SHAPE).window(100.0, 50.0)
+    window = Reference(road(), SHAPE, PlanningConfig()).window(100.0, 50.0)
     stations, offsets, _ = window.project(np.array([[70.0, 0.0], [200.0, 0.5], [120.0, 0.5]]))
     assert stations[0] >= -BEHIND - 1.5
     assert np.abs(offsets[:2]).min() > 5.0

@@ -1,0 +1,82 @@
+"""Where a stack comes from: the words of the command line -> a factory."""
+
+import importlib
+import sys
+import tomllib
+from pathlib import Path
+
+import msgspec
+
+from dvca_sumo.stack.bugs import BugError, build_with
+from dvca_sumo.stack.reference import Stack, StackConfig, StackContext, StackError, StackFactory, reference_stack
+
+
+class StackSource(msgspec.Struct, frozen=True):
+    """Which stack is to drive: words of the command line, as they are handed to other processes."""
+
+    stack: str | None = None  # of `--stack`; None is the reference stack
+    bug: str | None = None  # of `--bug`
+
+    @property
+    def is_reference(self) -> bool:
+        """Whether it is the reference stack, with whatever parameters: a bug is a switch of these."""
+        return self.stack is None or self.stack.endswith(".toml")
+
+
+def stack_factory(source: StackSource) -> StackFactory:
+    """The stack that is asked for: the reference one, parameters of it (FILE.toml), or MODULE:FACTORY.
+
+    A factory is called as `factory(context)` with a `StackContext` and returns a `Stack`.
+
+    Raises:
+        StackError: The file or factory cannot be read or imported, or holds something else.
+        BugError: No bug has that name, or the stack is not the reference one.
+    """
+    stack, bug = source.stack, source.bug
+    if source.is_reference:
+        config = StackConfig() if stack is None else _config(Path(stack))
+        build = config if bug is None else build_with(bug, config)
+        return lambda context: reference_stack(context, build)
+    assert stack is not None  # or it would be the reference stack
+    if bug is not None:
+        raise BugError(f"bug {bug!r} is a switch of the reference stack; {stack!r} has none")
+    module_name, separator, name = stack.partition(":")
+    if not separator:
+        raise StackError(f"no stack {stack!r} (allowed: MODULE:FACTORY or FILE.toml)")
+    if "" not in sys.path:
+        sys.path.insert(0, "")  # a user's module lies where the command is typed
+    try:
+        factory = getattr(importlib.import_module(module_name), name)
+    except Exception as error:  # noqa: BLE001 - a user's module may raise anything while it is imported
+        raise StackError(f"stack factory {stack!r} cannot be imported: {_said(error)}") from None
+    if not callable(factory):
+        raise StackError(f"stack factory {stack!r} is not callable: {factory!r}")
+    return built_checked(stack, factory)
+
+
+def built_checked(source: str, factory: StackFactory) -> StackFactory:
+    """`factory`, whose failures and wrong results are named as its own."""
+
+    def build(context: StackContext) -> Stack:
+        try:
+            stack = factory(context)
+        except Exception as error:
+            raise StackError(f"stack factory {source!r} raised {_said(error)}") from error
+        if not isinstance(stack, Stack):
+            raise StackError(f"stack factory {source!r} returned {type(stack).__name__}, not a Stack")
+        return stack
+
+    return build
+
+
+def _config(path: Path) -> StackConfig:
+    try:
+        return msgspec.toml.decode(path.read_bytes(), type=StackConfig)
+    except OSError as error:
+        raise StackError(f"stack file {path} cannot be read: {error.strerror}") from None
+    except (msgspec.ValidationError, msgspec.DecodeError, tomllib.TOMLDecodeError) as error:
+        raise StackError(f"stack file {path}: {error}") from None
+
+
+def _said(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"
