@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 
 import msgspec
 
-
 _HALVINGS = 20  # of the interval that holds the best share
 
 

@@ -79,12 +79,13 @@ def result_of(
         },
         "reproducible": found.is_reproducible,
         "digest": found.digest,
-        "versions": {
-            "dvca_sumo": _version("dvca-sumo"),
-            "sumo": _version("libsumo"),
-            "python": platform.python_version(),
-        },
+        "versions": versions(),
     }
+
+
+def versions() -> Json:
+    """Of what a result may depend on."""
+    return {"dvca_sumo": _version("dvca-sumo"), "sumo": _version("libsumo"), "python": platform.python_version()}
 
 
 def _fault(fault: Fault) -> Json:

@@ -1,12 +1,9 @@
-"""The command line: arguments, exit codes, progress; nothing else."""
+"""`dvca-sumo run`: one scenario, its violation explained."""
 
 import json
-import os
 import sys
 import time
-from enum import IntEnum
 from pathlib import Path
-from typing import NoReturn
 
 import click
 
@@ -15,31 +12,13 @@ from dvca_sumo.analysis.attribution import Attribution, AttributionStoppedError,
 from dvca_sumo.analysis.components import Verdict
 from dvca_sumo.analysis.dtest import Probe
 from dvca_sumo.api import CPUS, FactualDrive, load_scenario
-from dvca_sumo.engine.protocol import RunFailedError
-from dvca_sumo.interventions import COMMON, FaultError, fault_library
-from dvca_sumo.interventions.library import Parameter
+from dvca_sumo.cli.output import ExitCode, make_folder, tell, write_whole
 from dvca_sumo.record import Record
-from dvca_sumo.report.result import Json, Timing, result_of
+from dvca_sumo.report.result import Timing, result_of
 from dvca_sumo.report.terminal import verdict_text
-from dvca_sumo.roadmap import RoadMapError
-from dvca_sumo.scenario import ScenarioError
-from dvca_sumo.stack.bugs import BUGS, BugError
-from dvca_sumo.stack.reference import StackError
 from dvca_sumo.stack.sources import StackSource
 
-_REPEATS = 3
-
-
-class ExitCode(IntEnum):
-    """The contract's exit codes."""
-
-    NO_VIOLATION = 0
-    ATTRIBUTED = 1
-    USAGE = 2
-    BAD_INPUT = 3
-    UNRESOLVED = 4
-    INTERNAL = 70
-    INTERRUPTED = 130
+REPEATS = 3  # of each question in jitter mode
 
 
 class _Terminal(Progress):
@@ -54,13 +33,13 @@ class _Terminal(Progress):
     def factual(self, record: Record) -> None:
         self._factual_wall = time.perf_counter() - self._begin
         said = f"{len(record.violations)} violation(s)" if record.violations else "no violation"
-        _tell(f"factual run: {said}, {self._factual_wall:.1f} s")
+        tell(f"factual run: {said}, {self._factual_wall:.1f} s")
 
     def probe(self, probe: Probe) -> None:
         self._probes += 1
         ideal = "+".join(component.value for component in probe.question.ideal) or "nothing (the premise)"
         since = f" from #{probe.question.since.index}" if probe.question.since is not None else ""
-        _tell(f"probe {self._probes}: ideal {ideal}{since}: {probe.outcome.value}, {probe.wall:.1f} s")
+        tell(f"probe {self._probes}: ideal {ideal}{since}: {probe.outcome.value}, {probe.wall:.1f} s")
 
     def timing(self, engine: str) -> Timing:
         """What it cost up to now."""
@@ -68,13 +47,7 @@ class _Terminal(Progress):
         return Timing(self._factual_wall, attribution, engine, self._jobs)
 
 
-@click.group()
-@click.version_option(package_name="dvca-sumo")
-def program() -> None:
-    """Find which component of an automated driving system caused a violation, and which message to open first."""
-
-
-@program.command()
+@click.command()
 @click.argument("sumocfg", type=click.Path(path_type=Path))
 @click.option("--fault", "faults", multiple=True, metavar="NAME[:key=value,...]", help="Plant a fault; see `faults`.")
 @click.option("--bug", metavar="NAME", help="A real bug for the reference stack to have; see `faults`.")
@@ -84,7 +57,7 @@ def program() -> None:
 @click.option("--engine", type=click.Choice(list(api.ENGINES)), default=api.DEFAULT_ENGINE, show_default=True)
 @click.option("--jobs", type=click.IntRange(1), default=CPUS, show_default=True, help="Runs at once.")
 @click.option("--jitter", is_flag=True, help="Draw schedule and sensor noise anew for each run; majority of repeats.")
-@click.option("--repeats", type=click.IntRange(1), help=f"Runs of each question in jitter mode [default: {_REPEATS}]")
+@click.option("--repeats", type=click.IntRange(1), help=f"Runs of each question in jitter mode [default: {REPEATS}]")
 @click.option("--certify", is_flag=True, help="Ask the conclusion once more of the replay engine, from time 0.")
 @click.option("--begin", type=float, metavar="T", help="Start of the simulation [s].")
 @click.option("--end", type=float, metavar="T", help="Latest end of the simulation [s].")
@@ -121,13 +94,13 @@ def run(
     if bug is not None and not StackSource(stack).is_reference:
         raise click.UsageError("--bug is a switch of the reference stack: it does not go with --stack MODULE:FACTORY")
     if output is not None:
-        _make(output)
+        make_folder(output)
     terminal = _Terminal(jobs)
     scenario = load_scenario(sumocfg, ego, seed, begin, end)
-    drive = api.drive(scenario, faults, stack, (repeats or _REPEATS) if jitter else None, jobs, engine, bug)
+    drive = api.drive(scenario, faults, stack, (repeats or REPEATS) if jitter else None, jobs, engine, bug)
     terminal.factual(drive.record)
     if drive.engine.fallback is not None:
-        _tell(f"engine {drive.engine.name}: {drive.engine.fallback}")
+        tell(f"engine {drive.engine.name}: {drive.engine.fallback}")
     try:
         found = api.attribute(drive, terminal, certify=certify)
     except AttributionStoppedError as stopped:
@@ -137,85 +110,14 @@ def run(
     sys.exit(_exit_code(found))
 
 
-@program.command()
-def faults() -> None:
-    """List the fault library (name, component, parameters with units), and the real bugs."""
-    for name, entry in fault_library().items():
-        click.echo(f"{name}  ({entry.component.value})\n    {entry.summary}")
-        for key, parameter in entry.parameters.items():
-            click.echo(f"    {_described(key, parameter)}")
-    click.echo("every fault")
-    for key, parameter in COMMON.items():
-        click.echo(f"    {_described(key, parameter)}")
-    click.echo("real bugs, for --bug")
-    for name, bug in BUGS.items():
-        click.echo(f"{name}  ({bug.component.value})\n    {bug.summary}\n    {bug.source}")
-
-
-def main() -> NoReturn:
-    """The program: every error is one line and an exit code of the contract."""
-    try:
-        program.main(prog_name="dvca-sumo", standalone_mode=False)
-    except click.exceptions.NoArgsIsHelpError as error:
-        error.show()
-        _leave(ExitCode.USAGE)
-    except click.ClickException as error:
-        _tell(f"error: {error.format_message()}")
-        _leave(ExitCode.USAGE)
-    except (ScenarioError, FaultError, StackError, BugError, RoadMapError) as error:
-        _tell(f"error: {error}")
-        _leave(ExitCode.BAD_INPUT)
-    except RunFailedError as error:
-        _tell(f"error: {error}")
-        _leave(ExitCode.INTERNAL)
-    except (KeyboardInterrupt, click.Abort):
-        _tell("interrupted")
-        _leave(ExitCode.INTERRUPTED)
-    except Exception as error:
-        _tell(f"internal error: {type(error).__name__}: {error} (set DVCA_SUMO_TRACEBACK=1 to see where)")
-        if os.environ.get("DVCA_SUMO_TRACEBACK"):
-            raise
-        _leave(ExitCode.INTERNAL)
-    sys.exit(ExitCode.NO_VIOLATION)
-
-
 def _publish(drive: FactualDrive, found: Attribution, timing: Timing, output: Path | None, *, as_json: bool) -> None:
     result = result_of(drive.request.scenario, drive.request.faults, found, timing, drive.bug)
     if output is not None:
-        _write(output / "result.json", result)
+        write_whole(output / "result.json", json.dumps(result, indent=1) + "\n")
     click.echo(json.dumps(result, indent=1) if as_json else verdict_text(found, timing, drive.bug))
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise click.BadParameter(f"cannot make the folder {folder}: {error.strerror}", param_hint="'-o'") from None
-
-
-def _write(path: Path, result: Json) -> None:
-    """Whole or not at all: a reader never sees half a file."""
-    draft = path.with_suffix(".part")
-    draft.write_text(json.dumps(result, indent=1) + "\n")
-    draft.replace(path)
 
 
 def _exit_code(found: Attribution) -> ExitCode:
     if found.verdict is Verdict.NONE:
         return ExitCode.NO_VIOLATION
     return ExitCode.ATTRIBUTED if found.verdict in (Verdict.COMPONENT, Verdict.PLANNING) else ExitCode.UNRESOLVED
-
-
-def _described(key: str, parameter: Parameter) -> str:
-    allowed = f", {parameter.low:g} to {parameter.high:g}" if parameter.kind == "number" else ""
-    unit = f" [{parameter.unit}{allowed}]" if parameter.unit else ""
-    default = f"default {parameter.default}" if parameter.default != "" else "unset by default"
-    return f"{key:<8}{unit} {parameter.summary} ({default})"
-
-
-def _tell(line: str) -> None:
-    click.echo(line, err=True)
-
-
-def _leave(code: ExitCode) -> NoReturn:
-    sys.exit(int(code))

@@ -1,0 +1,37 @@
+"""The whole benchmark: cases in, scores out, nothing that was found is lost."""
+
+from collections.abc import Callable, Sequence
+
+from dvca_sumo.bench.cases import Case
+from dvca_sumo.bench.runs import Setting, analysed
+from dvca_sumo.bench.score import FAILED, Score
+from dvca_sumo.bench.store import Store, key_of
+from dvca_sumo.report.result import versions
+
+OnScore = Callable[[Score, int], None]  # a case's score, and how many are left
+
+
+def run_benchmark(
+    cases: Sequence[Case], settings: Sequence[Setting], jobs: int, store: Store | None, on_score: OnScore
+) -> list[Score]:
+    """The scores of all cases under each setting, in their order.
+
+    What the store holds already is not run again; what is found is kept there at once. A case that could
+    not be analysed is not kept: the next run tries it again.
+    """
+    asked = [(case, setting) for setting in settings for case in cases]
+    known = {row: score for row, pair in enumerate(asked) if store and (score := store.find(_key(*pair)))}
+    left = len(asked) - len(known)
+    for setting in settings:
+        rows = [row for row, pair in enumerate(asked) if pair[1] is setting and row not in known]
+        for number, score in analysed([asked[row][0] for row in rows], setting, jobs):
+            known[rows[number]] = score
+            left -= 1
+            if store is not None and score.verdict != FAILED:
+                store.add(_key(*asked[rows[number]]), score)
+            on_score(score, left)
+    return [known[row] for row in range(len(asked))]
+
+
+def _key(case: Case, setting: Setting) -> str:
+    return key_of([case, setting.seed, setting.repeats, setting.has_controls, versions()])

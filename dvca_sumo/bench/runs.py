@@ -1,0 +1,98 @@
+"""Cases analysed side by side, each in a process of its own, as they finish."""
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+
+import msgspec
+
+from dvca_sumo import api
+from dvca_sumo.analysis.attribution import Attribution
+from dvca_sumo.bench.cases import Case
+from dvca_sumo.bench.ground_truth import altered_messages
+from dvca_sumo.bench.score import Controls, Mode, Score, failed, scored
+from dvca_sumo.engine.processes import Failure, isolated
+from dvca_sumo.record import Record
+from dvca_sumo.violations import Answer
+
+_TIMEOUT = 3600.0  # [s] of wall time for one case: only a hang takes so long
+
+Attribute = Callable[[api.FactualDrive], Attribution]
+
+
+class Setting(msgspec.Struct, frozen=True):
+    """How cases are analysed."""
+
+    seed: int | None = None  # of the scenario; None: its own
+    repeats: int | None = None  # None: exact mode; else jitter mode with so many runs of each question
+    has_controls: bool = True
+    attribute: Attribute = api.attribute
+
+    @property
+    def mode(self) -> Mode:
+        """Its name."""
+        return "exact" if self.repeats is None else "jitter"
+
+
+def analysed(cases: Sequence[Case], setting: Setting, jobs: int) -> Iterator[tuple[int, Score]]:
+    """(row of the case, its score), as they finish; `jobs` cases at once.
+
+    A case whose process crashed or hung, or that cannot be run, has a score all the same: `failed`.
+    """
+    work = [partial(analysis_of, case, setting) for case in cases]
+    for row, answer in isolated(work, jobs, _TIMEOUT):
+        if isinstance(answer, Failure):
+            yield row, failed(cases[row], setting.mode, setting.seed or 0, answer.reason)
+        else:
+            yield row, answer
+
+
+def analysis_of(case: Case, setting: Setting) -> Score:
+    """The score of one case, found in this process.
+
+    Raises:
+        ScenarioError, FaultError, StackError, BugError: The case cannot be run.
+        RunFailedError: A run crashed or hung.
+    """
+    begin = time.perf_counter()
+    drive = _driven(case, setting, case.fault, case.bug)
+    factual = time.perf_counter() - begin
+    begin = time.perf_counter()
+    found = setting.attribute(drive)
+    attribution = time.perf_counter() - begin
+    return scored(
+        case,
+        found,
+        altered_messages(case, drive.request.scenario, drive.record, None if setting.repeats is None else 0),
+        mode=setting.mode,
+        seed=drive.request.scenario.seed,
+        walls=(factual, attribution),
+        controls=_controls(case, setting, drive.record) if setting.has_controls else None,
+    )
+
+
+def _driven(case: Case, setting: Setting, fault: str, bug: str, scenario: str = "") -> api.FactualDrive:
+    loaded = api.load_scenario(scenario or case.scenario, case.ego, setting.seed, begin=case.begin)
+    faults = [fault] if fault else []
+    return api.drive(loaded, faults, repeats=setting.repeats, jobs=1, bug=bug or None)
+
+
+def _controls(case: Case, setting: Setting, record: Record) -> Controls:
+    harmless = _is_safe(case, setting, case.harmless, case.bug, case.harmless_scenario)
+    return Controls(
+        without=_is_safe(case, setting, "", ""),
+        defective=None if not record.violations and _doubts(record) else bool(record.violations),
+        harmless=harmless,
+    )
+
+
+def _is_safe(case: Case, setting: Setting, fault: str, bug: str, scenario: str = "") -> bool | None:
+    drive = _driven(case, setting, fault, bug, scenario)
+    drive.engine.close()
+    if drive.record.violations:
+        return False
+    return None if _doubts(drive.record) else True
+
+
+def _doubts(record: Record) -> bool:
+    return any(one.answer is Answer.UNKNOWN for one in record.judgements)

@@ -1,0 +1,141 @@
+"""How an attribution compares with the truth about its case."""
+
+from typing import Literal
+
+import msgspec
+
+from dvca_sumo.analysis.attribution import Attribution
+from dvca_sumo.bench.cases import Case
+from dvca_sumo.messages import MessageId
+from dvca_sumo.record import Record
+
+Mode = Literal["exact", "jitter"]
+
+FAILED = "failed"  # verdict of a case that could not be analysed
+
+
+class Controls(msgspec.Struct, frozen=True):
+    """The three runs that show the defect to be the cause; None: could not be told."""
+
+    without: bool | None  # the drive without the defect is safe
+    defective: bool | None  # the drive with it violates
+    harmless: bool | None  # the same defect where it does no harm is safe
+
+    @property
+    def hold(self) -> bool:
+        """Whether all three came out as they must."""
+        return self.without is True and self.defective is True and self.harmless is True
+
+
+class Score(msgspec.Struct, frozen=True):
+    """One case, analysed."""
+
+    suite: str
+    name: str
+    scenario: str
+    mode: Mode
+    seed: int
+    expected_component: str
+    component: str | None  # None: none was named
+    component_success: bool
+    message_success: bool
+    message_distance_s: float | None  # [s] to the nearest altered message; None without one, or without an answer
+    altered_share: float  # of the component's messages: guessing succeeds so often
+    reduction_rate: float  # 1 - 1 / messages of the run; 0 where the message is wrong
+    component_reduction_rate: float  # the same over the messages of the component alone
+    probes: int
+    simulated_s: float
+    factual_wall_s: float
+    attribution_wall_s: float
+    verdict: str
+    reason: str
+    controls: Controls | None  # None: not run
+    command: str  # that shows this case alone
+
+
+def scored(
+    case: Case,
+    found: Attribution,
+    altered: tuple[int, ...],
+    *,
+    mode: Mode,
+    seed: int,
+    walls: tuple[float, float],
+    controls: Controls | None,
+) -> Score:
+    """Hold an attribution against the messages that the defect `altered`.
+
+    Args:
+        case: What was analysed.
+        found: The answer.
+        altered: Indices of the expected component's messages that the defect changed.
+        mode: How it was run.
+        seed: Of the scenario.
+        walls: [s] of the factual run, of the attribution.
+        controls: What the control runs said.
+    """
+    record, component = found.record, case.component
+    named = None if found.components is None else found.components.component
+    is_right = named is component
+    is_message_right = is_right and found.message is not None and found.message.index in altered
+    counts = record.message_counts
+    return Score(
+        suite=case.suite,
+        name=case.name,
+        scenario=case.scenario,
+        mode=mode,
+        seed=seed,
+        expected_component=component.value,
+        component=None if named is None else named.value,
+        component_success=is_right,
+        message_success=is_message_right,
+        message_distance_s=_distance(found, altered, case) if is_right else None,
+        altered_share=len(altered) / counts[component] if counts[component] else 0.0,
+        reduction_rate=1.0 - 1.0 / sum(counts.values()) if is_message_right else 0.0,
+        component_reduction_rate=1.0 - 1.0 / counts[component] if is_message_right else 0.0,
+        probes=len(found.probes),
+        simulated_s=sum(probe.simulated for probe in found.probes),
+        factual_wall_s=walls[0],
+        attribution_wall_s=walls[1],
+        verdict=found.verdict.value,
+        reason=found.reason,
+        controls=controls,
+        command=case.command(seed, has_jitter=mode == "jitter"),
+    )
+
+
+def failed(case: Case, mode: Mode, seed: int, reason: str) -> Score:
+    """The score of a case that could not be analysed: no success of any kind."""
+    return Score(
+        suite=case.suite,
+        name=case.name,
+        scenario=case.scenario,
+        mode=mode,
+        seed=seed,
+        expected_component=case.component.value,
+        component=None,
+        component_success=False,
+        message_success=False,
+        message_distance_s=None,
+        altered_share=0.0,
+        reduction_rate=0.0,
+        component_reduction_rate=0.0,
+        probes=0,
+        simulated_s=0.0,
+        factual_wall_s=0.0,
+        attribution_wall_s=0.0,
+        verdict=FAILED,
+        reason=reason,
+        controls=None,
+        command=case.command(seed, has_jitter=mode == "jitter"),
+    )
+
+
+def _distance(found: Attribution, altered: tuple[int, ...], case: Case) -> float | None:
+    if found.message is None or not altered:
+        return None
+    return min(abs(_time(found.record, case, index) - found.message.time) for index in altered)
+
+
+def _time(record: Record, case: Case, index: int) -> float:
+    return record.mark(MessageId(case.component, index)).time
