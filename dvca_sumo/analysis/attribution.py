@@ -103,6 +103,20 @@ def factual_run(engine: Engine, request: Request) -> Record:
     return engine.record(_factual_task(request))
 
 
+def setting_of(request: Request, record: Record, violation: Violation) -> Setting:
+    """What all questions about `violation` of a factual run share."""
+    is_mission = violation.category is Category.MISSION
+    return Setting(
+        scenario=request.scenario,
+        faults=request.faults,
+        futures=recorded_futures(record.moments),
+        stop=StopRule(after_violation=0.0) if is_mission else _settled(record, violation),
+        start=record.start,
+        is_mission=is_mission,
+        jitters=_jitters(request),
+    )
+
+
 def explain(
     engine: Engine, request: Request, record: Record, progress: Progress, witness: Engine | None = None
 ) -> Attribution:
@@ -122,7 +136,7 @@ def explain(
     found = replace(found, violation=principal(record.violations), verdict=Verdict.UNRESOLVED)
     asked: list[Dtest] = []
     try:
-        setting = _setting(request, record, principal(record.violations))
+        setting = setting_of(request, record, principal(record.violations))
         asked.append(Dtest(engine, setting, progress.probe))
         found = replace(found, until=setting.stop.at)
         for answer in _steps(found, engine, asked[0], request):
@@ -140,19 +154,6 @@ def attribute(engine: Engine, request: Request, progress: Progress) -> Attributi
     record = factual_run(engine, request)
     progress.factual(record)
     return explain(engine, request, record, progress)
-
-
-def _setting(request: Request, record: Record, violation: Violation) -> Setting:
-    is_mission = violation.category is Category.MISSION
-    return Setting(
-        scenario=request.scenario,
-        faults=request.faults,
-        futures=recorded_futures(record.moments),
-        stop=StopRule(after_violation=0.0) if is_mission else _settled(record, violation),
-        start=record.start,
-        is_mission=is_mission,
-        jitters=_jitters(request),
-    )
 
 
 def _all_probes(asked: list[Dtest]) -> tuple[Probe, ...]:

@@ -10,6 +10,7 @@ from dvca_sumo import api
 from dvca_sumo.analysis.attribution import Attribution
 from dvca_sumo.bench.cases import Case
 from dvca_sumo.bench.ground_truth import altered_messages
+from dvca_sumo.bench.proof import is_proven
 from dvca_sumo.bench.score import Controls, Mode, Score, failed, scored
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.record import Record
@@ -60,13 +61,22 @@ def analysis_of(case: Case, setting: Setting) -> Score:
     begin = time.perf_counter()
     found = setting.attribute(drive)
     attribution = time.perf_counter() - begin
+    return judged(case, setting, drive, found, (factual, attribution))
+
+
+def judged(
+    case: Case, setting: Setting, drive: api.FactualDrive, found: Attribution, walls: tuple[float, float]
+) -> Score:
+    """The score of an answer about `drive`; `walls` [s] are what the factual run and the answer took."""
+    is_exact = setting.repeats is None
     return scored(
         case,
         found,
-        altered_messages(case, drive.request.scenario, drive.record, None if setting.repeats is None else 0),
+        altered_messages(case, drive.request.scenario, drive.record, None if is_exact else 0),
         mode=setting.mode,
         seed=drive.request.scenario.seed,
-        walls=(factual, attribution),
+        walls=walls,
+        is_proven=is_proven(drive, found) if is_exact else None,
         controls=_controls(case, setting, drive.record) if setting.has_controls else None,
     )
 

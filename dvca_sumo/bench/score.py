@@ -49,6 +49,7 @@ class Score(msgspec.Struct, frozen=True):
     attribution_wall_s: float
     verdict: str
     reason: str
+    is_proven: bool | None  # by runs of their own, of the definition of the reported message; None: not asked
     controls: Controls | None  # None: not run
     command: str  # that shows this case alone
 
@@ -61,6 +62,7 @@ def scored(
     mode: Mode,
     seed: int,
     walls: tuple[float, float],
+    is_proven: bool | None,
     controls: Controls | None,
 ) -> Score:
     """Hold an attribution against the messages that the defect `altered`.
@@ -72,6 +74,7 @@ def scored(
         mode: How it was run.
         seed: Of the scenario.
         walls: [s] of the factual run, of the attribution.
+        is_proven: See `Score`.
         controls: What the control runs said.
     """
     record, component = found.record, case.component
@@ -99,6 +102,7 @@ def scored(
         attribution_wall_s=walls[1],
         verdict=found.verdict.value,
         reason=found.reason,
+        is_proven=is_proven,
         controls=controls,
         command=case.command(seed, has_jitter=mode == "jitter"),
     )
@@ -126,6 +130,7 @@ def failed(case: Case, mode: Mode, seed: int, reason: str) -> Score:
         attribution_wall_s=0.0,
         verdict=FAILED,
         reason=reason,
+        is_proven=None,
         controls=None,
         command=case.command(seed, has_jitter=mode == "jitter"),
     )

@@ -48,6 +48,7 @@ class Summary(msgspec.Struct, frozen=True):
     failures: int  # that could not be analysed: they count as wrong
     components: Share
     messages: Share
+    proofs: Share | None  # reported messages of which the definition holds; None: not asked
     controls: Share | None  # None: not run
     reduction_rate: float  # average
     component_reduction_rate: float
@@ -76,6 +77,8 @@ def summary_of(scores: Sequence[Score]) -> Summary:
     messages = share_of(sum(score.message_success for score in scores), total)
     controlled = [score.controls for score in scores if score.controls is not None]
     controls = share_of(sum(one.hold for one in controlled), len(controlled)) if controlled else None
+    asked = [score.is_proven for score in scores if score.is_proven is not None]
+    proofs = share_of(sum(asked), len(asked)) if asked else None
     confusion: dict[str, Counter[str]] = {}
     for score in scores:
         confusion.setdefault(score.expected_component, Counter())[score.component or "none"] += 1
@@ -88,6 +91,7 @@ def summary_of(scores: Sequence[Score]) -> Summary:
         failures=failures,
         components=components,
         messages=messages,
+        proofs=proofs,
         controls=controls,
         reduction_rate=reduction,
         component_reduction_rate=_mean([score.component_reduction_rate for score in scores]),
@@ -96,12 +100,18 @@ def summary_of(scores: Sequence[Score]) -> Summary:
         median_wall_s=statistics.median(walls),
         worst_wall_s=max(walls),
         confusion={expected: dict(found) for expected, found in confusion.items()},
-        checks=_checks(scores[0], components, messages, controls, reduction),
+        checks=_checks(
+            scores[0],
+            components,
+            messages,
+            {"reported messages are proven": proofs, "controls hold": controls},
+            reduction,
+        ),
     )
 
 
 def _checks(
-    like: Score, components: Share, messages: Share, controls: Share | None, reduction: float
+    like: Score, components: Share, messages: Share, others: dict[str, Share | None], reduction: float
 ) -> tuple[Check, ...]:
     wanted = (_COMPONENTS, _MESSAGES if like.mode == "exact" else _JITTER_MESSAGES)
     if like.suite == "random":
@@ -113,9 +123,8 @@ def _checks(
     if like.suite != "random":
         text = f"average reduction: {reduction:.2%} (at least {_REDUCTION:.1%})"
         checks.append(Check(text, reduction >= _REDUCTION))
-    if controls is not None:
-        checks.append(_at_least("controls hold", controls, 1.0))
-    return tuple(checks)
+    asked = [_at_least(what, share, wanted[0]) for what, share in others.items() if share is not None]
+    return (*checks, *asked)
 
 
 def _at_least(what: str, share: Share, wanted: float) -> Check:

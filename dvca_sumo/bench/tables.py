@@ -124,6 +124,8 @@ def _fault_of(score: Score) -> str:
     if not score.message_success:
         away = "" if score.message_distance_s is None else f", {score.message_distance_s:.2f} s from the nearest"
         return f"the message is not one that the defect altered{away}"
+    if score.is_proven is False:
+        return "the reported message is not the last one that could have prevented it"
     if score.controls is not None and not score.controls.hold:
         said = {"without": "safe without the defect", "defective": "violates", "harmless": "harmless elsewhere"}
         broken = [text for name, text in said.items() if getattr(score.controls, name) is not True]

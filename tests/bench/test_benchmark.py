@@ -1,0 +1,76 @@
+"""Interrupted and broken benchmarks: what is known stays known, what failed is tried again."""
+
+from pathlib import Path
+
+import pytest
+
+from bench.scores import score
+from dvca_sumo.bench import benchmark
+from dvca_sumo.bench.benchmark import run_benchmark
+from dvca_sumo.bench.cases import Case
+from dvca_sumo.bench.runs import Setting, analysed
+from dvca_sumo.bench.score import FAILED, Score
+from dvca_sumo.bench.store import Store
+from dvca_sumo.messages import Component
+
+CASES = [
+    Case("injected", name, "nets/cs1.sumocfg", Component.PERCEPTION, fault="perception.miss")
+    for name in ("a", "b", "c")
+]
+
+
+def ignore(_score: Score, _left: int) -> None:
+    """Nobody watches."""
+
+
+def test_it_goes_on_where_it_was_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def dying_after_two(cases, setting, jobs):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202, ARG001
+        for row, case in enumerate(cases):
+            if len(asked) == 2:
+                raise KeyboardInterrupt
+            asked.append(case.name)
+            yield row, score(case.name)
+
+    monkeypatch.setattr(benchmark, "analysed", dying_after_two)
+    with pytest.raises(KeyboardInterrupt):
+        run_benchmark(CASES, [Setting()], 1, Store(tmp_path / "s"), ignore)
+    asked.clear()
+    found = run_benchmark(CASES, [Setting()], 1, Store(tmp_path / "s"), ignore)
+    assert asked == ["c"]
+    assert [one.name for one in found] == ["a", "b", "c"]
+
+
+def test_a_case_that_failed_is_tried_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    verdicts = iter([FAILED, "component"])
+
+    def failing_once(cases, setting, jobs):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202, ARG001
+        yield 0, score("a", verdict=next(verdicts))
+
+    monkeypatch.setattr(benchmark, "analysed", failing_once)
+    for expected in (FAILED, "component"):
+        (found,) = run_benchmark(CASES[:1], [Setting()], 1, Store(tmp_path / "s"), ignore)
+        assert found.verdict == expected
+
+
+def test_other_seeds_and_modes_are_other_questions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Setting] = []
+
+    def noting(cases, setting, jobs):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202, ARG001
+        asked.extend(setting for _ in cases)
+        yield from ((row, score(case.name)) for row, case in enumerate(cases))
+
+    monkeypatch.setattr(benchmark, "analysed", noting)
+    settings = [Setting(), Setting(seed=2), Setting(repeats=3)]
+    for _ in range(2):
+        assert len(run_benchmark(CASES[:1], settings, 1, Store(tmp_path / "s"), ignore)) == 3
+    assert asked == settings
+
+
+def test_a_case_that_cannot_be_run_is_no_success_and_says_why() -> None:
+    broken = Case("injected", "x", "nets/none.sumocfg", Component.CONTROL, fault="control.lateral")
+    ((_, found),) = analysed([broken], Setting(), 1)
+    assert found.verdict == FAILED
+    assert not found.component_success
+    assert "none.sumocfg" in found.reason
