@@ -67,12 +67,19 @@ class Junction(msgspec.Struct, frozen=True, eq=False):
 
     def conflicting(self, movement: Movement) -> frozenset[str]:
         """Lanes of all movements whose paths conflict with `movement`'s."""
-        return self._lanes(self.foes.get(movement.index, ""))
+        return _lanes(self.conflicting_movements(movement))
+
+    def conflicting_movements(self, movement: Movement) -> tuple[Movement, ...]:
+        """All movements whose paths conflict with `movement`'s, by link index."""
+        return self._marked(self.foes.get(movement.index, ""))
 
     def prior(self, movement: Movement) -> frozenset[str]:
         """Lanes of the movements that have priority over `movement`."""
-        return self._lanes(self.responses.get(movement.index, ""))
+        return _lanes(self._marked(self.responses.get(movement.index, "")))
 
-    def _lanes(self, bits: str) -> frozenset[str]:
-        marked = (movement for bit, movement in zip(reversed(bits), self.movements, strict=False) if bit == "1")
-        return frozenset(lane for movement in marked for lane in movement.lanes)
+    def _marked(self, bits: str) -> tuple[Movement, ...]:
+        return tuple(movement for bit, movement in zip(reversed(bits), self.movements, strict=False) if bit == "1")
+
+
+def _lanes(movements: tuple[Movement, ...]) -> frozenset[str]:
+    return frozenset(lane for movement in movements for lane in movement.lanes)

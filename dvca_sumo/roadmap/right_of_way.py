@@ -5,7 +5,7 @@ import numpy as np
 from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.roadmap.lanes import Lane, Movement
 from dvca_sumo.roadmap.reading import NetContents
-from dvca_sumo.roadmap.route import Control, Crossing, StopLine
+from dvca_sumo.roadmap.route import Approach, Control, Crossing, StopLine
 
 # SUMO's letters of right of way where no signal stands; Z: a zipper merge, where nobody may insist.
 _CONTROLS = {
@@ -15,6 +15,7 @@ _CONTROLS = {
     "Z": Control.YIELD,
     "=": Control.RIGHT_BEFORE_LEFT,
 }
+STOP_SIGNS = (Control.STOP, Control.ALL_WAY_STOP)
 _AROUND = 10.0  # [m] before and behind a junction a crossing may still touch the route
 _SAMPLE = 0.1  # [m]
 
@@ -33,7 +34,17 @@ def stop_line(net: NetContents, movement: Movement, station: float, exit_station
         yields_to=junction.prior(movement),
         crosses=junction.conflicting(movement),
         exit_station=exit_station,
+        stop_signs=_stop_signs(net, movement) if control in STOP_SIGNS else (),
     )
+
+
+def _stop_signs(net: NetContents, movement: Movement) -> tuple[Approach, ...]:
+    """The approaches of other edges that come to stop signs of their own, in the junction's order."""
+    own = net.lanes[movement.from_lane].edge
+    foes = net.junctions[movement.junction].conflicting_movements(movement)
+    stopping = dict.fromkeys(foe.from_lane for foe in foes if _CONTROLS.get(foe.state) in STOP_SIGNS)
+    lanes = (net.lanes[lane] for lane in stopping)
+    return tuple(Approach(lane.id, lane.line, lane.width) for lane in lanes if lane.edge != own)
 
 
 def crossings(

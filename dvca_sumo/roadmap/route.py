@@ -22,6 +22,14 @@ class Control(enum.StrEnum):
     PRIORITY = "priority"
 
 
+class Approach(msgspec.Struct, frozen=True, eq=False):
+    """A lane that comes to a stop sign."""
+
+    lane: str
+    line: Polyline  # centre line, up to the stop sign
+    width: float  # [m]
+
+
 class StopLine(msgspec.Struct, frozen=True, eq=False):
     """Where the route enters a junction, and whom it meets there."""
 
@@ -33,6 +41,7 @@ class StopLine(msgspec.Struct, frozen=True, eq=False):
     yields_to: frozenset[str]  # lanes of movements with priority; with SIGNAL: under permissive green or dark
     crosses: frozenset[str]  # lanes of all movements whose paths conflict
     exit_station: float  # [m] where the route leaves the junction
+    stop_signs: tuple[Approach, ...] = ()  # others of conflicting movements, with STOP and ALL_WAY_STOP
 
 
 class Crossing(msgspec.Struct, frozen=True, eq=False):

@@ -50,6 +50,30 @@ BUGS: dict[str, Bug] = {
         source="Apollo commit cc890a4eb (2017-08-14)",
         switches={"stops_past_objects": True},
     ),
+    "apollo-3634": Bug(
+        component=Component.PERCEPTION,
+        summary="swaps length and width of its boxes: what stands across the road seems to stand along it",
+        source="Apollo pull request 3634 (56586a54c, 2018-03-29)",
+        switches={"swaps_sides": True},
+    ),
+    "planfuzz-v1": Bug(
+        component=Component.PLANNING,
+        summary="takes a lane for blocked by what stands beside it: the lateral buffer of static objects is too large",
+        source="PlanFuzz V1, Apollo issue 13922 (2021-07-05)",
+        switches={"lateral_buffer": 0.8},
+    ),
+    "planfuzz-v7": Bug(
+        component=Component.PLANNING,
+        summary="waits at a stop sign for parked bicycles beside another approach, off its lane, without end",
+        source="PlanFuzz V7, Apollo issue 13926 (2021-07-06)",
+        switches={"watch_beside": 5.0},
+    ),
+    "apollo-c803010": Bug(
+        component=Component.PLANNING,
+        summary="looks for the destination on the route at (x, x) instead of (x, y), and does not stop where it is not",
+        source="Apollo commit c80301050 (2017-08-18)",
+        switches={"projects_x_twice": True},
+    ),
 }
 
 

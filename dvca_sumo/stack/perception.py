@@ -31,6 +31,7 @@ class PerceptionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     coast_time: float = 0.8  # [s] a confirmed track lives on without being seen
     still_speed: float = 0.25  # [m/s] slower tracks are reported at rest
     signal_hold: float = 0.3  # [s] a signal head not read keeps what it showed
+    swaps_sides: bool = False  # bug: boxes are told with length and width swapped, turned by 90 degrees that is
 
 
 class Tracker:
@@ -114,11 +115,14 @@ class Tracker:
         velocities = means[:, 2:]
         speeds = np.hypot(velocities[:, 0], velocities[:, 1])
         is_still = (speeds < self._config.still_speed) | (classes == _STATIC)
+        forms = tracks.forms[confirmed]
+        if self._config.swaps_sides:
+            forms = forms[:, [0, 2, 1]]
         return TrackedObjects(
             time,
             tracks.ids[confirmed],
             classes,
-            np.concatenate([means[:, :2], tracks.forms[confirmed]], axis=1),
+            np.concatenate([means[:, :2], forms], axis=1),
             np.where(is_still[:, None], 0.0, velocities),
             signals,
         )

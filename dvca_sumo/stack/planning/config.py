@@ -44,6 +44,9 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     crossing_margin: float = 2.0  # [m] of people who walk across at a pedestrian crossing
     person_slow_gap: float = 1.5  # [m] slow down when passing people closer than this
     object_slow_gap: float = 0.8  # [m] slow down when passing standing objects closer than this
+    lateral_buffer: float = 0.1  # [m] that what stands is taken to be wider on each side, where it bounds the path
+    buffer_before: float = 3.0  # [m] and longer, towards the ego
+    buffer_behind: float = 2.0  # [m] and on its far side
 
     # Nudging: going around what stands, within the lanes of our direction.
     nudge_clearance: float = 0.7  # [m] wanted sideways
@@ -74,6 +77,10 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     unseen_reach: float = 20.0  # [m] beyond braking distance, where a signal should have been seen
     unseen_patience: float = 5.0  # [s] standing at a signal never seen before it is taken for dark
     sign_wait: float = 1.0  # [s] standing at a stop sign
+    sign_patience: float = 8.0  # [s] standing at a stop sign for a single other one who was there first
+    watch_before: float = 5.0  # [m] before another approach's stop sign, at most, who stands there is waiting at it
+    watch_beside: float = 0.0  # [m] from that lane's centre line, at most; on the lane in any case
+    watch_until: float = 10.0  # [m] from that stop sign, those who waited there have left
 
     # Where the map has no speed limit.
     urban_limit: float = 13.89  # [m/s]
@@ -85,3 +92,4 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     lines_at_rear_axle: bool = False  # takes the station of a stop line for where the rear axle is to stop
     unmapped_at_bound: bool = False  # drives at `speed_bound` where the map has no limit
     stops_past_objects: bool = False  # stops `object_gap` past the near end of what stands, not before it
+    projects_x_twice: bool = False  # looks for the destination on the route at (x, x) instead of (x, y)

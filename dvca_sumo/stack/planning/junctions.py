@@ -3,9 +3,10 @@
 from bisect import bisect_left
 from typing import NamedTuple
 
-from dvca_sumo.messages import SignalColour
+from dvca_sumo.messages import SignalColour, TrackedObjects
 from dvca_sumo.roadmap.route import Control, Route, StopLine
 from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.watching import WatchList
 
 _AHEAD = 200.0  # [m] lines further away are not looked at
 _OVERRUN = 0.5  # [m] the front bumper may be past a line and still wait at it
@@ -35,9 +36,16 @@ class Junctions:
         self._entered: set[int] = set()  # lines crossed on yellow, for which it was too late to stop
         self._standing: dict[int, float] = {}  # since when the ego stands at a line
         self._released: set[int] = set()  # lines at which standing was enough
+        self._watching = [WatchList(line.stop_signs, config) for line in route.stop_lines]
 
     def step(
-        self, time: float, front: float, rear: float, speed: float, signals: dict[str, SignalColour]
+        self,
+        time: float,
+        front: float,
+        rear: float,
+        speed: float,
+        signals: dict[str, SignalColour],
+        objects: TrackedObjects,
     ) -> list[LineView]:
         """The lines of the junctions the ego is in or comes to; `front`, `rear`: route stations of the bumpers."""
         for signal, colour in signals.items():
@@ -51,6 +59,8 @@ class Junctions:
                 self._standing.setdefault(index, time)
             else:
                 self._standing.pop(index, None)
+            if distance < _AT_LINE and index not in self._released:
+                self._watching[index].step(objects, is_standing=index in self._standing)
             views.append(self._view(index, distance, time, speed))
         return views
 
@@ -60,11 +70,19 @@ class Junctions:
             stop, gives_way = self._at_signal(index, distance, time, speed)
         else:
             stop, gives_way = None, True
-            if line.control in (Control.STOP, Control.ALL_WAY_STOP) and not self._stood(
-                index, time, self._config.sign_wait
-            ):
-                stop = f"stop sign {line.lane}"
+            if line.control in (Control.STOP, Control.ALL_WAY_STOP) and index not in self._released:
+                stop = self._at_sign(index, time)
         return LineView(line, distance, stop if distance > -_OVERRUN else None, gives_way)
+
+    def _at_sign(self, index: int, time: float) -> str | None:
+        """Whether to stand on: for a while, and for those who were there first."""
+        stood = time - self._standing.get(index, time)
+        others = self._watching[index].waits_for(stood)
+        if stood >= self._config.sign_wait and not others:
+            self._released.add(index)
+            return None
+        label = f"stop sign {self._lines[index].lane}"
+        return f"{label} for {', '.join(map(str, others))}" if others else label
 
     def _at_signal(self, index: int, distance: float, time: float, speed: float) -> tuple[str | None, bool]:
         signal = self._lines[index].signal_id or ""

@@ -57,6 +57,7 @@ def speed_caps(
 
 def nearest_stop(
     to_destination: float,
+    blocker: int | None,
     scene: Scene,
     graph: Graph,
     views: list[LineView],
@@ -66,12 +67,13 @@ def nearest_stop(
 ) -> Stop:
     """The first place where the ego has to stop whatever others do: destination, line, object, occupied exit.
 
-    `to_destination` counts from the front bumper [m].
+    `to_destination` counts from the front bumper [m]. `blocker`: the standing object, as a row of the
+    scene, that leaves the path no room between its bounds.
     """
     stops = [Stop(to_destination, _GIVE_AT_DESTINATION, "stop destination")]
     stops += [_at_line(view.distance, view.stop, config) for view in views if view.stop]
     occupied_from = math.inf
-    obstacle = _obstacle(scene, graph, shape.front)
+    obstacle = _obstacle(scene, graph, blocker, shape.front)
     if obstacle is not None:
         occupied_from = float(graph.low[obstacle, 0]) - shape.front
         label = f"stop behind {scene.ids[scene.owners[obstacle]]}"
@@ -90,11 +92,13 @@ def _at_line(distance: float, label: str, config: PlanningConfig) -> Stop:
     return Stop(distance - config.stop_line_gap, config.stop_line_gap, label)
 
 
-def _obstacle(scene: Scene, graph: Graph, front: float) -> int | None:
+def _obstacle(scene: Scene, graph: Graph, blocker: int | None, front: float) -> int | None:
     """The nearest future that stands in the way, as a row; not one that the front bumper has cleared already."""
     still = slice(scene.moving, None)
     low = graph.low[still, 0]
     in_way = graph.occupied[still, 0] & ((low > front) | (graph.gaps[still, 0] < 0.0))
+    if blocker is not None:
+        in_way |= scene.owners[still] == blocker
     return scene.moving + int(np.where(in_way, low, np.inf).argmin()) if in_way.any() else None
 
 

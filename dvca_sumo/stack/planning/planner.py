@@ -14,7 +14,9 @@ from dvca_sumo.messages import (
     VehicleShape,
 )
 from dvca_sumo.roadmap.route import Route
+from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.destination import stop_station
 from dvca_sumo.stack.planning.junctions import Junctions, LineView
 from dvca_sumo.stack.planning.limits import nearest_stop, speed_caps
 from dvca_sumo.stack.planning.meeting import Demand, Meetings
@@ -41,6 +43,7 @@ class Planner:
         self._route = route
         self._shape = shape
         self._reference = Reference(route, shape, config)
+        self._destination = stop_station(route, config)
         self._junctions = Junctions(route, config)
         self._nudging = NudgeDecider(shape, config)
         self._meetings = Meetings(shape, config)
@@ -92,7 +95,9 @@ class Planner:
         window = self._reference.window(station, self._reach(station, start.speed))
         scene = scene_in(window, predicted, time, self._nudging.stood, config)
         nose = station if config.lines_at_rear_axle else station + shape.front
-        views = self._junctions.step(time, nose, station - shape.rear_overhang, start.speed, signals)
+        views = self._junctions.step(
+            time, nose, station - shape.rear_overhang, start.speed, signals, predicted.objects
+        )
         lateral = lateral_start(start, window, offset)
         nudges = self._nudging.step(Situation(time, start.speed, lateral, window, scene, views))
         path = path_along(window, start, lateral, [nudge.plateau for nudge in nudges], shape, config)
@@ -116,8 +121,9 @@ class Planner:
             caps = [min(cap, config.astray_speed) for cap in caps]
         leaders, others = leading(graph, scene, shape, config)
         leader = leader_of(leaders, graph, scene, shape)
-        to_destination = self._route.destination - window.station - shape.front
-        stops = [nearest_stop(to_destination, scene, graph, views, leader, shape, config)]
+        to_destination = self._destination - window.station - shape.front
+        blocker = blocking(scene, window, path, shape, config)
+        stops = [nearest_stop(to_destination, blocker, scene, graph, views, leader, shape, config)]
         profile = roll_out(start.speed, start.acceleration, caps, stops, leader, config)
         demands: dict[int, Demand] = {}
         for _ in range(_ROUNDS):
