@@ -3,6 +3,7 @@
 import enum
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from dvca_sumo.roadmap.route import Approach
 from dvca_sumo.stack.planning.config import PlanningConfig
 
 _WATCHED_CLASSES = (int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE))
+_SAME = 1.0  # [m] from where a track was lost, one found is the same
 _ALONG = 0.5  # cosine of the largest angle (60 degrees) to a lane at which someone drives on it
 
 
@@ -21,14 +23,25 @@ class Stage(enum.StrEnum):
     STOP = "stop"  # standing: who was noted is waited for
 
 
+class _Place(NamedTuple):
+    """Where one was last seen, and which sign it stood at."""
+
+    x: float  # [m]
+    y: float  # [m]
+    approach: Approach
+
+
 class WatchList:
-    """Those who go before the ego at one stop sign: noted while it comes to its line, crossed out as they leave."""
+    """Those who go before the ego at one stop sign: noted while it comes to its line, crossed out as they leave.
+
+    Who is lost and found again at the same place under another number is still the same one.
+    """
 
     def __init__(self, approaches: Sequence[Approach], config: PlanningConfig) -> None:
         self._approaches = approaches
         self._config = config
         self._stage = Stage.PRE_STOP
-        self._watched: dict[int, Approach] = {}  # by track: where it stood
+        self._watched: dict[int, _Place] = {}  # by track
 
     def step(self, objects: TrackedObjects, *, is_standing: bool) -> None:
         """Look around; `is_standing`: the ego stands at its line."""
@@ -55,12 +68,28 @@ class WatchList:
             reach = max(0.5 * approach.width, config.watch_beside)
             at_line = line.length - (stations + 0.5 * boxes[rows, 3]) <= config.watch_before
             found = rows[at_line & (np.abs(offsets) <= reach) & (along >= _ALONG)]
-            self._watched.update(dict.fromkeys(objects.ids[found].tolist(), approach))
+            for row in found.tolist():
+                x, y = boxes[row, :2].tolist()
+                self._watched[int(objects.ids[row])] = _Place(x, y, approach)
 
     def _cross_out(self, objects: TrackedObjects) -> None:
-        places = dict(zip(objects.ids.tolist(), objects.boxes[:, :2].tolist(), strict=True))
-        self._watched = {
-            track: approach
-            for track, approach in self._watched.items()
-            if track in places and math.dist(places[track], approach.line.points[-1]) <= self._config.watch_until
+        there = {
+            track: (x, y)
+            for track, kind, (x, y) in zip(
+                objects.ids.tolist(), objects.classes.tolist(), objects.boxes[:, :2].tolist(), strict=True
+            )
+            if kind in _WATCHED_CLASSES
         }
+        watched = {}
+        for track, place in sorted(self._watched.items(), key=lambda one: one[0] not in there):  # the lost ones last
+            found = track if track in there else _found_again(place, there)
+            if found is None or math.dist(there[found], place.approach.line.points[-1]) > self._config.watch_until:
+                continue
+            watched[found] = _Place(*there.pop(found), place.approach)
+        self._watched = watched
+
+
+def _found_again(lost: _Place, there: dict[int, tuple[float, float]]) -> int | None:
+    """The track nearest to where one was lost, if it is as near as the same one."""
+    nearest = min(there, key=lambda track: math.dist(there[track], lost[:2]), default=None)
+    return nearest if nearest is not None and math.dist(there[nearest], lost[:2]) < _SAME else None
