@@ -100,11 +100,12 @@ class Reference:
         body = (-shape.rear_overhang - 1.0, shape.front + 1.0)
         table[_LIMIT] = _lowest_within(inside, line.stations, _limits(route, config), body)
         self._table = table
+        self._end = line.length + _BEYOND - _OUTLOOK
 
     def locate(self, x: float, y: float, near: float) -> tuple[float, float, float] | None:
         """Station, offset and the line's heading there of a point within some metres of station `near`.
 
-        Newton's method; None where that does not converge on the line.
+        Newton's method; None where that does not converge on the line, or far past its end.
         """
         station = near
         for _ in range(_ITERATIONS):
@@ -116,7 +117,7 @@ class Reference:
             ahead = (x - east) * cosine + (y - north) * sine
             across = (y - north) * cosine - (x - east) * sine
             if abs(ahead) < _CONVERGED:
-                return (station, across, heading) if station >= 0.0 else None
+                return (station, across, heading) if 0.0 <= station <= self._end else None
             station += ahead / max(1.0 - curvature * across, _NEAREST_CENTRE)
         return None
 
