@@ -31,7 +31,9 @@ class PerceptionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     coast_time: float = 0.8  # [s] a confirmed track lives on without being seen
     still_speed: float = 0.25  # [m/s] slower tracks are reported at rest
     signal_hold: float = 0.3  # [s] a signal head not read keeps what it showed
-    swaps_sides: bool = False  # bug: boxes are told with length and width swapped, turned by 90 degrees that is
+
+    # A real bug (see stack/bugs.py): what the build does wrong.
+    swaps_sides: bool = False  # tells boxes with length and width swapped: as if turned by 90 degrees
 
 
 class Tracker:

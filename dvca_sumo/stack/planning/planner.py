@@ -95,9 +95,7 @@ class Planner:
         window = self._reference.window(station, self._reach(station, start.speed))
         scene = scene_in(window, predicted, time, self._nudging.stood, config)
         nose = station if config.lines_at_rear_axle else station + shape.front
-        views = self._junctions.step(
-            time, nose, station - shape.rear_overhang, start.speed, signals, predicted.objects
-        )
+        views = self._junctions.step(time, nose, station - shape.rear_overhang, start.speed, signals, predicted.objects)
         lateral = lateral_start(start, window, offset)
         nudges = self._nudging.step(Situation(time, start.speed, lateral, window, scene, views))
         path = path_along(window, start, lateral, [nudge.plateau for nudge in nudges], shape, config)
