@@ -90,6 +90,21 @@ def test_all_way_stop_lists_everyone_it_meets(plain: NetBuilder) -> None:
     assert line.yields_to == line.crosses != frozenset()
 
 
+def test_all_way_stop_knows_the_other_stop_signs(plain: NetBuilder) -> None:
+    roadmap = tee(plain, "allway_stop")
+    signs = first_line(roadmap, "wx", "xe").stop_signs
+    assert {sign.lane for sign in signs} == {"sx_0", "ex_0"}
+    for sign in signs:
+        assert sign.width == roadmap.lanes[sign.lane].width
+        assert sign.line.points[-1] == pytest.approx(roadmap.lanes[sign.lane].line.points[-1])
+
+
+def test_a_stop_sign_at_the_side_road_is_the_only_one(plain: NetBuilder) -> None:
+    roadmap = tee(plain, "priority_stop")
+    assert first_line(roadmap, "sx", "xw").stop_signs == ()
+    assert first_line(roadmap, "wx", "xe").stop_signs == ()
+
+
 def test_signal_is_named_and_keeps_the_priorities_of_permissive_green(plain: NetBuilder) -> None:
     roadmap = tee(plain, "traffic_light")
     left, straight = first_line(roadmap, "ex", "xs"), first_line(roadmap, "wx", "xe")

@@ -8,8 +8,10 @@ import numpy.testing as npt
 import pytest
 
 from dvca_sumo.messages import LocalizationEstimate, ObjectClass, SignalColour, TrackedObjects, VehicleShape
+from dvca_sumo.stack.bugs import build_with
 from dvca_sumo.stack.perception import PerceptionConfig, Tracker, mutual_nearest
 from dvca_sumo.stack.protocols import Detections
+from dvca_sumo.stack.reference import StackConfig
 from dvca_sumo.stack.sensors import SensorConfig, Sensors
 from dvca_sumo.truth import EgoTruth, Moment, ObjectsTruth
 
@@ -54,6 +56,16 @@ def tracked(scenes: list[list[Thing]], tracker: Tracker | None = None, first: in
 
 def ids(messages: list[TrackedObjects]) -> list[list[int]]:
     return [message.ids.tolist() for message in messages]
+
+
+def test_a_build_that_swaps_the_sides_of_boxes_tells_everything_else_alike() -> None:
+    scenes = [[car(20.0, 0.0, heading=math.pi / 2.0)]] * 4
+    fixed = tracked(scenes)[-1]
+    buggy = tracked(scenes, Tracker(build_with("apollo-3634", StackConfig()).perception))[-1]
+    npt.assert_allclose(fixed.boxes[0, 3:], [4.6, 1.8], atol=1e-9)
+    npt.assert_allclose(buggy.boxes[0, 3:], [1.8, 4.6], atol=1e-9)
+    npt.assert_array_equal(buggy.boxes[:, :3], fixed.boxes[:, :3])
+    npt.assert_array_equal(buggy.velocities, fixed.velocities)
 
 
 def test_nothing_detected_gives_empty_arrays_of_the_right_shapes() -> None:
