@@ -14,6 +14,7 @@ from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.frames import relative, transferred
 from dvca_sumo.messages import ACCELERATION, CURVATURE, HEADING, SPEED, Component, MessageId, Trajectory, X, Y
 from dvca_sumo.oracles import judge, judges
+from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.oracles.no_progress import NoProgress
 from dvca_sumo.oracles.place import Places
 from dvca_sumo.record import MessageMark, Record
@@ -40,9 +41,9 @@ def first_violating_plan(
 ) -> PlanningFinding | None:
     """The first planning message that itself leads to `violation`, or None when none does.
 
-    For safety and traffic rules: it is missing, does not begin where the ego is, or breaks a rule of
-    the violation's family when driven for `FORESIGHT`. For missions: it is missing, does not begin
-    where the ego is, or plans to stand without a reason.
+    For safety, traffic rules and a destination that is driven past: it is missing, does not begin where
+    the ego is, or breaks a rule of the violation's family when driven for `FORESIGHT`. For other missions:
+    it is missing, does not begin where the ego is, or plans to stand without a reason.
     """
     executions = record.executions[Component.PLANNING]
     waiting = NoProgress(Places(record.route, roadmap), thresholds)
@@ -53,11 +54,11 @@ def first_violating_plan(
         if not isinstance(execution.message, Trajectory):
             return PlanningFinding(mark, "no trajectory was published")
         reason = _discontinuity(record, execution.message, execution.tick)
-        if not reason and violation.category is Category.MISSION:
+        if not reason and violation.category is Category.MISSION and violation.kind != Destination.overrun:
             moment = record.moment_at(execution.tick)
             waiting.observe(moment)  # it follows the ego along its route
             begun = violation.time - thresholds.no_progress_time if violation.kind == NoProgress.kind else -math.inf
-            if mark.time >= begun and violation.kind != "destination_overrun" and not waiting.has_reason(moment):
+            if mark.time >= begun and not waiting.has_reason(moment):
                 reason = _standstill(execution.message)
         elif not reason:
             reason = _breach(record, roadmap, thresholds, execution.message, execution.tick, violation)

@@ -16,6 +16,7 @@ class Destination:
     """
 
     kind = "destination"
+    overrun = "destination_overrun"
 
     def __init__(self, places: Places, thresholds: Thresholds) -> None:
         self._findings = Findings(self.kind, Category.MISSION, places)
@@ -35,7 +36,7 @@ class Destination:
             return self._findings.next()
         if beyond > self._tolerance:
             self._is_overrun = True
-            self._find(moment, "destination_overrun", beyond, f"{beyond:.1f} m beyond the destination without a stop")
+            self._find(moment, self.overrun, beyond, f"{beyond:.1f} m beyond the destination without a stop")
         elif beyond >= -self._tolerance and abs(moment.ego.speed) <= self._standing_speed:
             self.has_arrived = True
         return self._findings.next()

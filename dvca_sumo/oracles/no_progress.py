@@ -19,6 +19,8 @@ _OBJECT_MARGIN = 0.5  # [m] the way being so much wider than the ego on each sid
 _JUNCTION_REACH = 15.0  # [m] and traffic at a junction or crossing so near ahead,
 _TRAFFIC_REACH = 50.0  # [m] so near to the ego
 _TRAFFIC_SPEED = 0.5  # [m/s] and so fast at least
+_SIGN_REACH = 5.0  # [m] a stop sign so near ahead is one, too, to an ego that stands
+_SIGN_TIME = 2.0  # [s] not longer than so
 
 
 class NoProgress:
@@ -39,7 +41,9 @@ class NoProgress:
         spans = [(line.station - _JUNCTION_REACH, line.exit_station) for line in route.stop_lines]
         spans += [(crossing.start_station - _JUNCTION_REACH, crossing.end_station) for crossing in route.crossings]
         self._conflicts = np.array(spans, dtype=np.float64).reshape(-1, 2)
+        self._signs = [line for line in route.stop_lines if line.control in (Control.STOP, Control.ALL_WAY_STOP)]
         self._signals = [line for line in route.stop_lines if line.control is Control.SIGNAL]
+        self._standing_since = math.inf  # [s]
         self._anchor: tuple[float, float] | None = None
         self._begun = self._now = 0.0  # [s]
         self._idle_since = 0.0  # [s] neither progress nor a reason since
@@ -50,6 +54,8 @@ class NoProgress:
     def observe(self, moment: Moment) -> Violation | None:
         """See `Oracle`."""
         here, self._now = (moment.ego.x, moment.ego.y), moment.time
+        is_standing = moment.ego.speed <= self._thresholds.standing_speed
+        self._standing_since = min(self._standing_since, moment.time) if is_standing else math.inf
         if self._anchor is None:
             self._begun = moment.time
         if self._anchor is None or math.dist(here, self._anchor) >= self._thresholds.no_progress_distance:
@@ -82,16 +88,21 @@ class NoProgress:
             self._blind = f"the colour of the signal ahead was not known at {moment.time:.1f} s"
 
     def has_reason(self, moment: Moment) -> bool:
-        """Whether there is a reason to stand: the destination, a signal, something in the way, traffic that crosses."""
+        """Whether there is a reason to stand: destination, signal, stop sign, something in the way, crossing traffic."""
         place, route = self._places.at(moment), self._places.route
         if abs(place.station - route.destination) <= self._thresholds.destination_tolerance:
             return True
         if self._colour_ahead(moment) in {SignalColour.RED, SignalColour.YELLOW}:
             return True
+        if self._is_at_sign(place.station) and moment.time - self._standing_since < _SIGN_TIME:
+            return True
         if ahead(self._places, moment, _OBJECT_REACH, _OBJECT_MARGIN).rows.size:
             return True
         is_at_conflict = (self._conflicts[:, 0] <= place.station) & (place.station <= self._conflicts[:, 1])
         return bool(is_at_conflict.any()) and _has_traffic(moment)
+
+    def _is_at_sign(self, station: float) -> bool:
+        return any(0.0 <= line.station - station <= _SIGN_REACH for line in self._signs)
 
     def _is_signal_unknown(self, moment: Moment) -> bool:
         return self._colour_ahead(moment) is None
