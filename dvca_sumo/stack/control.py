@@ -75,9 +75,7 @@ def _place(knots: list[float], value: float) -> Place:
     start = knots[i]
     width = knots[i + 1] - start
     share = (value - start) / width if width > 0.0 else 1.0
-    if share < 0.0:
-        return i, 0.0
-    return i, (share if share < 1.0 else 1.0)
+    return i, (min(share, 1.0) if share > 0.0 else 0.0)
 
 
 def _at(place: Place, values: list[float]) -> float:

@@ -34,14 +34,18 @@ class LaneMotion:
         """No object gets farther than this within the horizon [m]."""
         return np.maximum(speeds, speeds + trends * self._config.trend_duration) * _HORIZON + 10.0
 
-    def travelled(self, paths: list[LanePath], stations: Floats, speeds: Floats, trends: Floats) -> Floats:
+    def travelled(
+        self, paths: list[LanePath], stations: Floats, speeds: Floats, trends: Floats, farthest: float
+    ) -> Floats:
         """Stations at PREDICTION_TIMES (h, t) of objects at `stations` (h,), `trends` being accelerations (h,).
+
+        None of them gets farther than `farthest` [m], by their `reach`.
 
         Speed over distance s is v^2 = v0^2 + 2 a s until the trend has run its course, capped by bends and limits;
         distance over time follows by integrating ds / v, metre by metre.
         """
         config = self._config
-        count = int(self.reach(speeds, trends).max()) + 2
+        count = int(farthest) + 2
         bends, limits = self._paths.caps(paths, stations, count)
         metres = np.arange(count, dtype=np.float64)
         squares = (speeds * speeds)[:, None]

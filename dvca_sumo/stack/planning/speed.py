@@ -94,7 +94,7 @@ def roll_out(
     highest, lowest = config.acceleration, -config.comfort_braking
     for k in range(STEPS):
         metre = int(s + v * _LOOK_AHEAD)
-        free = (caps[metre if metre < last else last] - v) / _LOOK_AHEAD
+        free = (caps[min(metre, last)] - v) / _LOOK_AHEAD
         if free > highest:
             free = highest
         elif free < lowest:
@@ -130,9 +130,7 @@ def _for_stop(stop: Stop, s: float, v: float, time: float, config: PlanningConfi
         allowed = _HOLD
     elif distance > _TOUCH:
         needed = v * v / (2.0 * distance)
-        allowed, firm = config.acceleration - needed * needed / config.braking, -_FIRMER * needed
-        if allowed < firm:
-            allowed = firm
+        allowed = max(config.acceleration - needed * needed / config.braking, -_FIRMER * needed)
     else:
         allowed = -config.hard_braking
     if allowed < -config.comfort_braking:
@@ -161,13 +159,13 @@ def _moved(s: float, v: float, a: float, wanted: float, config: PlanningConfig) 
     """One step on, with the acceleration moving linearly towards `wanted` within the limits of jerk."""
     is_comfort = wanted >= -config.comfort_braking and a >= -config.comfort_braking
     change = (config.jerk if is_comfort else config.hard_jerk) * STEP
-    after = wanted
-    if after > a + change:
+    if wanted > a + change:
         after = a + change
-    if after < a - change:
+    elif wanted < a - change:
         after = a - change
-    if after < -config.hard_braking:
-        after = -config.hard_braking
+    else:
+        after = wanted
+    after = max(after, -config.hard_braking)
     if v <= 0.0 and after <= 0.0:
         return s, 0.0, 0.0
     reached = v + 0.5 * STEP * (a + after)
