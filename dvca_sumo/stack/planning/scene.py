@@ -16,6 +16,7 @@ _PERSON = int(ObjectClass.PEDESTRIAN)
 _SOON = int(np.searchsorted(PREDICTION_TIMES, 1.0))  # far enough to tell going from staying, too near for a guess
 _SOON_TIME = float(PREDICTION_TIMES[_SOON])  # [s]
 _SPARSE = 4  # every so many times of a hypothesis do to bound it
+_FEW = 8  # hypotheses are placed in less time than it takes to find out which are far away
 _AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
 
 
@@ -66,8 +67,8 @@ def scene_in(
     stays[predicted.owners[counts]] = False
     rows, still = counts.nonzero()[0], stays.nonzero()[0]
     poses = predicted.poses[rows]
-    around = _is_around(window, poses)
-    if not around.all():
+    if len(rows) > _FEW:
+        around = _is_around(window, poses)
         rows, poses = rows[around], poses[around]
     owners = predicted.owners[rows]
     now, futures = _extents(window, objects.boxes, poses, owners, still)
