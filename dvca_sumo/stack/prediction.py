@@ -160,7 +160,9 @@ def _told_apart(
     if len(first) == len(lanes):
         return owners, probabilities, poses, lanes
     kept = list(first.values())
-    return owners[kept], np.bincount(same, probabilities)[kept], poses[kept], [lanes[row] for row in kept]
+    sums = np.zeros(len(lanes))
+    np.add.at(sums, same, probabilities)
+    return owners[kept], sums[kept], poses[kept], [lanes[row] for row in kept]
 
 
 def _is_wheeled(tracked: TrackedObjects) -> npt.NDArray[np.bool_]:
