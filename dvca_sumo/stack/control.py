@@ -72,9 +72,10 @@ class _Track:
 def _place(knots: list[float], value: float) -> Place:
     """Where `value` lies among ascending `knots`."""
     i = bisect_right(knots, value, 1, len(knots) - 1) - 1
-    width = knots[i + 1] - knots[i]
-    share = (value - knots[i]) / width if width > 0.0 else 1.0
-    return i, min(max(share, 0.0), 1.0)
+    start = knots[i]
+    width = knots[i + 1] - start
+    share = (value - start) / width if width > 0.0 else 1.0
+    return i, (min(share, 1.0) if share > 0.0 else 0.0)
 
 
 def _at(place: Place, values: list[float]) -> float:
@@ -143,10 +144,11 @@ class TrackingController:
 
     def _acceleration(self, speed: float, wanted: float, behind: float, track: _Track, age: float) -> float:
         config = self._config
-        soon = _place(track.times, age + config.standstill_preview)
-        if max(wanted, _at(soon, track.speeds)) <= config.standstill_speed:
-            self._integral = 0.0
-            return self._halting(speed, behind)
+        if wanted <= config.standstill_speed:
+            soon = _at(_place(track.times, age + config.standstill_preview), track.speeds)
+            if soon <= config.standstill_speed:
+                self._integral = 0.0
+                return self._halting(speed, behind)
         error = wanted - speed
         position = min(config.max_position_error, max(-config.max_position_error, behind))
         ahead = _at(_place(track.times, age + config.acceleration_preview), track.accelerations)

@@ -28,15 +28,24 @@ class LaneChanges:
         self._lanes = roadmap.lanes
         self._paths = paths
 
-    def added(self, candidates: Candidates, tracked: TrackedObjects, reaches: Floats) -> Candidates:
+    def added(
+        self, candidates: Candidates, drift: Floats, tracked: TrackedObjects, reaches: Floats
+    ) -> tuple[Candidates, Floats]:
         """The candidates and, for each object that drifts to a neighbouring lane, that lane's likeliest continuation.
 
-        What a change is given is taken from the object's other candidates. `reaches` (n,) [m] is how far
-        each object may get.
+        What a change is given is taken from the object's other candidates.
+
+        Args:
+            candidates: What the objects do that keep their lanes.
+            drift: (h,) their lateral speeds [m/s], to the left.
+            tracked: The objects.
+            reaches: (n,) how far each object may get [m].
+
+        Returns:
+            All candidates, and the lateral speeds of all.
         """
-        drift = lateral_speeds(candidates, tracked.velocities)
         if not (np.abs(drift) >= self._config.min_lateral_speed).any():
-            return candidates
+            return candidates, drift
         likely, sides = self._changing(candidates, drift)
         rows: list[int] = []
         paths: list[LanePath] = []
@@ -49,14 +58,15 @@ class LaneChanges:
                 guesses.append(station)
                 paths.append(self._paths.branches(lane, station + float(reaches[candidates.owners[row]]))[0][0])
         if not rows:
-            return candidates
+            return candidates, drift
         owners = candidates.owners[rows]
         places = self._paths.project(paths, np.array(guesses), tracked.boxes[owners, :2])
         changes = Candidates(owners, paths, likely[rows], places).chosen(np.flatnonzero(places.beyond == 0.0))
         kept = np.ones(len(tracked.ids))
         kept[changes.owners] -= changes.probabilities
         keeping = candidates._replace(probabilities=candidates.probabilities * kept[candidates.owners])
-        return joined(keeping, changes)
+        everything = joined(keeping, changes)
+        return everything, lateral_speeds(everything, tracked.velocities)
 
     def _changing(self, candidates: Candidates, drift: Floats) -> tuple[Floats, list[str]]:
         """How likely a change is (h,), 0 where none shows, and to which side; `drift` (h,) [m/s] is to the left."""

@@ -34,27 +34,32 @@ class LaneMotion:
         """No object gets farther than this within the horizon [m]."""
         return np.maximum(speeds, speeds + trends * self._config.trend_duration) * _HORIZON + 10.0
 
-    def travelled(self, paths: list[LanePath], stations: Floats, speeds: Floats, trends: Floats) -> Floats:
+    def travelled(
+        self, paths: list[LanePath], stations: Floats, speeds: Floats, trends: Floats, farthest: float
+    ) -> Floats:
         """Stations at PREDICTION_TIMES (h, t) of objects at `stations` (h,), `trends` being accelerations (h,).
+
+        None of them gets farther than `farthest` [m], by their `reach`.
 
         Speed over distance s is v^2 = v0^2 + 2 a s until the trend has run its course, capped by bends and limits;
         distance over time follows by integrating ds / v, metre by metre.
         """
         config = self._config
-        count = int(self.reach(speeds, trends).max()) + 2
+        count = int(farthest) + 2
         bends, limits = self._paths.caps(paths, stations, count)
         metres = np.arange(count, dtype=np.float64)
         squares = (speeds * speeds)[:, None]
         final = np.maximum(speeds + trends * config.trend_duration, 0.0)
-        lowest, highest = np.minimum(speeds, final)[:, None], np.maximum(speeds, final)[:, None]
-        free = np.sqrt(np.maximum(squares + 2.0 * trends[:, None] * metres, 0.0))
-        free = np.minimum(np.maximum(free, lowest), highest)
-        slowing = np.sqrt(np.maximum(squares - 2.0 * config.braking * metres, 0.0))
+        finals = (final * final)[:, None]
+        # All in squares of speeds, so that one root is taken.
+        free = squares + 2.0 * trends[:, None] * metres
+        free = np.minimum(np.maximum(free, np.minimum(squares, finals)), np.maximum(squares, finals))
+        slowing = squares - 2.0 * config.braking * metres
         pace = np.maximum(config.speeding, speeds / limits[:, 0])[:, None]
-        profile = np.minimum(free, np.maximum(np.minimum(bends, pace * limits), slowing))
-        profile = np.maximum(profile, _CRAWL)
+        caps = np.minimum(bends, pace * limits)
+        profile = np.maximum(np.sqrt(np.minimum(free, np.maximum(caps * caps, slowing))), _CRAWL)
         times = np.zeros(profile.shape)
-        np.cumsum(2.0 / (profile[:, 1:] + profile[:, :-1]), axis=1, out=times[:, 1:])
+        (2.0 / (profile[:, 1:] + profile[:, :-1])).cumsum(axis=1, out=times[:, 1:])
         # All rows in one interpolation: each is moved to a stretch of the time axis of its own.
         apart = 2.0 * _LATE * np.arange(len(paths))[:, None]
         wanted = (PREDICTION_TIMES + apart).ravel()

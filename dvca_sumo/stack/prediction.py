@@ -64,17 +64,17 @@ class MapPrediction:
         self._time = tracked.time
         trends = self._trends(tracked.ids.tolist(), speeds.tolist(), elapsed)
         reaches = self._motion.reach(speeds, trends)
-        candidates = self._changes.added(self._on_lanes(tracked, speeds, reaches, elapsed), tracked, reaches)
-        candidates, futures, lanes = self._along_lanes(tracked, candidates, speeds, trends)
-        rest = (np.bincount(candidates.owners, minlength=len(speeds)) == 0).nonzero()[0]
-        owners = np.concatenate([candidates.owners, rest])
+        candidates = self._on_lanes(tracked, speeds, reaches, elapsed)
+        owners, probabilities, poses, lanes = self._along_lanes(tracked, candidates, speeds, trends, reaches)
+        rest = (np.bincount(owners, minlength=len(speeds)) == 0).nonzero()[0]
+        owners = np.concatenate([owners, rest])
         order = owners.argsort(kind="stable")
-        poses = np.concatenate([futures, self._straight_on(tracked, rest, speeds)])
+        poses = np.concatenate([poses, self._straight_on(tracked, rest, speeds)])
         lanes += [self._following.lanes_of(track) for track in tracked.ids[rest].tolist()]
         return PredictedObjects(
             objects=tracked,
             owners=owners[order],
-            probabilities=np.concatenate([candidates.probabilities, np.ones(len(rest))])[order],
+            probabilities=np.concatenate([probabilities, np.ones(len(rest))])[order],
             poses=poses[order],
             lanes=tuple(lanes[row] for row in order.tolist()),
         )
@@ -114,52 +114,55 @@ class MapPrediction:
         )
 
     def _along_lanes(
-        self, tracked: TrackedObjects, candidates: Candidates, speeds: Floats, trends: Floats
-    ) -> tuple[Candidates, Floats, list[tuple[str, ...]]]:
-        """The candidates that differ within the horizon, their poses (h, t, 3) and lanes.
+        self, tracked: TrackedObjects, candidates: Candidates, speeds: Floats, trends: Floats, reaches: Floats
+    ) -> tuple[Integers, Floats, Floats, list[tuple[str, ...]]]:
+        """The candidates and lane changes that differ within the horizon.
+
+        Their owners (h,), probabilities (h,), poses (h, t, 3) and lanes.
 
         Cars seek the lane's centre, bicycles keep their side of it.
         """
-        owners, paths, _, places = candidates
+        drifts = lateral_speeds(candidates, tracked.velocities)
+        candidates, drifts = self._changes.added(candidates, drifts, tracked, reaches)
+        owners, paths, probabilities, places = candidates
         if not len(owners):
-            return candidates, np.empty((0, len(PREDICTION_TIMES), 3)), []
+            return owners, probabilities, np.empty((0, len(PREDICTION_TIMES), 3)), []
         own = speeds[owners]
-        stations = self._motion.travelled(paths, places.stations, own, trends[owners])
+        stations = self._motion.travelled(paths, places.stations, own, trends[owners], float(reaches[owners].max()))
         is_bicycle = tracked.classes[owners] == _BICYCLE
         keeps_side = is_bicycle & (np.abs(places.offsets) <= places.half_widths)
         targets = np.where(keeps_side, places.offsets, 0.0)
-        offsets, slants = self._motion.settled(
-            places.offsets, targets, lateral_speeds(candidates, tracked.velocities), own
-        )
+        offsets, slants = self._motion.settled(places.offsets, targets, drifts, own)
         poses = self._paths.poses(paths, stations, offsets)
         poses[:, :, 2] = wrapped_all(poses[:, :, 2] + slants)
         poses[:, 0] = tracked.boxes[owners, :3]
         ends = zip(paths, stations[:, 0].tolist(), stations[:, -1].tolist(), strict=True)
         lanes = [path.lanes_between(start, end) for path, start, end in ends]
-        return _told_apart(candidates, poses, lanes)
+        return _told_apart(owners, probabilities, poses, lanes)
 
     def _straight_on(self, tracked: TrackedObjects, rows: Integers, speeds: Floats) -> Floats:
         """Constant velocity (n, t, 3), which is none for a standing vehicle or obstacle."""
+        poses = np.empty((len(rows), len(PREDICTION_TIMES), 3))
+        poses[:] = tracked.boxes[rows, None, :3]
         stands = (speeds < self._config.standing_speed) & (tracked.classes != _PERSON)
-        velocities = np.where(stands[:, None], 0.0, tracked.velocities)[rows]
-        boxes, poses = tracked.boxes[rows], np.empty((len(rows), len(PREDICTION_TIMES), 3))
-        for axis in (0, 1):
-            poses[:, :, axis] = boxes[:, axis, None] + velocities[:, axis, None] * PREDICTION_TIMES
-        poses[:, :, 2] = boxes[:, 2, None]
+        moves = (~stands[rows]).nonzero()[0]
+        if moves.size:
+            poses[moves, :, :2] += tracked.velocities[rows[moves], None] * PREDICTION_TIMES[:, None]
         return poses
 
 
 def _told_apart(
-    candidates: Candidates, poses: Floats, lanes: list[tuple[str, ...]]
-) -> tuple[Candidates, Floats, list[tuple[str, ...]]]:
+    owners: Integers, probabilities: Floats, poses: Floats, lanes: list[tuple[str, ...]]
+) -> tuple[Integers, Floats, Floats, list[tuple[str, ...]]]:
     """One of each object's candidates that follow the same lanes: they part beyond the horizon only."""
     first: dict[tuple[int, tuple[str, ...]], int] = {}
-    same = [first.setdefault(key, row) for row, key in enumerate(zip(candidates.owners.tolist(), lanes, strict=True))]
+    same = [first.setdefault(key, row) for row, key in enumerate(zip(owners.tolist(), lanes, strict=True))]
     if len(first) == len(lanes):
-        return candidates, poses, lanes
-    kept = np.array(list(first.values()))
-    sums = np.bincount(same, candidates.probabilities)[kept]
-    return candidates.chosen(kept)._replace(probabilities=sums), poses[kept], [lanes[row] for row in kept.tolist()]
+        return owners, probabilities, poses, lanes
+    kept = list(first.values())
+    sums = np.zeros(len(lanes))
+    np.add.at(sums, same, probabilities)
+    return owners[kept], sums[kept], poses[kept], [lanes[row] for row in kept]
 
 
 def _is_wheeled(tracked: TrackedObjects) -> npt.NDArray[np.bool_]:

@@ -53,16 +53,11 @@ class Tracks:
         self.means: Floats = np.zeros((0, 4))  # x, y, vx, vy
         self.covariances: Floats = np.zeros((0, 4, 4))
         self.forms: Floats = np.zeros((0, 3))  # heading, length, width
+        self.hits: Integers = np.zeros(0, dtype=np.int64)  # detections each track has had
         self.votes: Integers = np.zeros((0, _CLASSES), dtype=np.int64)  # hits by class
         self.classes: Integers = np.zeros(0, dtype=np.int64)  # what most hits said; a tie goes to the lower class
         self.sweeps: Integers = np.zeros(0, dtype=np.int64)  # since the first hit, that included
         self.last_hits: Floats = np.zeros(0)  # [s]
-
-    @property
-    def hits(self) -> Integers:
-        """Detections each track has had, (n,)."""
-        hits: Integers = self.votes.sum(axis=1)
-        return hits
 
     def predict(self, dt: float) -> None:
         """Move all tracks on by dt [s]."""
@@ -78,11 +73,12 @@ class Tracks:
         """Correct track rows[k] by measurement k."""
         velocities = self.means[rows, 2:]
         speeds = np.hypot(velocities[:, 0], velocities[:, 1])
-        votes = self.votes.copy()
+        hits, votes = self.hits.copy(), self.votes.copy()
+        hits[rows] += 1
         votes[rows, found.classes] += 1
         last_hits = self.last_hits.copy()
         last_hits[rows] = time
-        self.votes, self.classes, self.last_hits = votes, votes.argmax(axis=1), last_hits
+        self.hits, self.votes, self.classes, self.last_hits = hits, votes, votes.argmax(axis=1), last_hits
         self._update_forms(rows, found, speeds)
         self._update_motion(rows, found, speeds)
 
@@ -138,6 +134,7 @@ class Tracks:
         self.means = np.concatenate([self.means, means])
         self.covariances = np.concatenate([self.covariances, covariances])
         self.forms = np.concatenate([self.forms, found.boxes[:, 2:]])
+        self.hits = np.concatenate([self.hits, np.ones(count, dtype=np.int64)])
         self.votes = np.concatenate([self.votes, np.eye(_CLASSES, dtype=np.int64)[found.classes]])
         self.classes = np.concatenate([self.classes, found.classes])
         self.sweeps = np.concatenate([self.sweeps, np.ones(count, dtype=np.int64)])
@@ -167,6 +164,7 @@ class Tracks:
         self.means = self.means[flags]
         self.covariances = self.covariances[flags]
         self.forms = self.forms[flags]
+        self.hits = self.hits[flags]
         self.votes = self.votes[flags]
         self.classes = self.classes[flags]
         self.sweeps = self.sweeps[flags]

@@ -79,7 +79,7 @@ class NudgeDecider:
         standing = [scene.ids[row] for row in scene.is_standing.nonzero()[0].tolist()]
         self._since = {track: self._since.get(track, situation.time) for track in standing}
         nudges = []
-        for blocker in self._blockers(scene, situation.window):
+        for blocker in self._blockers(scene, situation.window) if standing else ():
             offset = self._offset(blocker, situation)
             if offset is not None:
                 nudges.append(Nudge(blocker.track, self._plateau(blocker, offset, situation)))

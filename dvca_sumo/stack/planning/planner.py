@@ -168,7 +168,7 @@ def _points(path: Path, profile: Profile) -> Floats:
         points[:, column] = np.interp(arcs, path.arcs, values)
     points[:, 4] = speeds
     points[:, 5] = accelerations
-    parts = np.interp(arcs, path.arcs, np.arange(len(path.arcs))) % 1.0
+    parts = np.interp(arcs, path.arcs, np.arange(len(path.arcs), dtype=np.float64)) % 1.0
     bulge = 0.5 * points[:, 6] * parts * (1.0 - parts)  # of an arc over its chord; rows of the path are 1 m apart
     points[:, 1] += bulge * np.sin(points[:, 3])
     points[:, 2] -= bulge * np.cos(points[:, 3])

@@ -69,7 +69,9 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         turn = curvatures * step
         missed = ahead - step * scale
         offsets = across - 0.5 * turn * step
-        offsets = np.where(np.abs(missed) > 1.0, np.copysign(np.hypot(missed, offsets), offsets), offsets)
+        beyond = (np.abs(missed) > 1.0).nonzero()[0]
+        if beyond.size:
+            offsets[beyond] = np.copysign(np.hypot(missed[beyond], offsets[beyond]), offsets[beyond])
         return step + (nearest - BEHIND), offsets, headings + turn
 
     def _seen(self, points: Floats, nearest: Integers) -> tuple[Floats, Floats, Floats, Floats]:

@@ -14,7 +14,9 @@ Flags = npt.NDArray[np.bool_]
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
 _SOON = int(np.searchsorted(PREDICTION_TIMES, 1.0))  # far enough to tell going from staying, too near for a guess
+_SOON_TIME = float(PREDICTION_TIMES[_SOON])  # [s]
 _SPARSE = 4  # every so many times of a hypothesis do to bound it
+_FEW = 8  # hypotheses are placed in less time than it takes to find out which are far away
 _AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
 
 
@@ -64,9 +66,12 @@ def scene_in(
     stays = np.ones(len(standing), dtype=np.bool_)
     stays[predicted.owners[counts]] = False
     rows, still = counts.nonzero()[0], stays.nonzero()[0]
-    rows = rows[_is_around(window, predicted.poses[rows])]
+    poses = predicted.poses[rows]
+    if len(rows) > _FEW:
+        around = _is_around(window, poses)
+        rows, poses = rows[around], poses[around]
     owners = predicted.owners[rows]
-    now, futures = _extents(window, objects.boxes, predicted.poses[rows], owners, still)
+    now, futures = _extents(window, objects.boxes, poses, owners, still)
     return Scene(
         ids=ids,
         classes=objects.classes,
@@ -84,9 +89,10 @@ def scene_in(
 
 def _foreseen_speeds(predicted: PredictedObjects, counts: Flags) -> Floats:
     """Mean speed (n,) [m/s] over the next second in the fastest hypothesis that counts; 0 without any."""
-    moved = predicted.poses[counts, _SOON, :2] - predicted.poses[counts, 0, :2]
+    moved = predicted.poses[:, _SOON, :2] - predicted.poses[:, 0, :2]
+    foreseen = np.hypot(moved[:, 0], moved[:, 1]) / _SOON_TIME
     speeds = np.zeros(len(predicted.objects.ids))
-    np.maximum.at(speeds, predicted.owners[counts], np.hypot(moved[:, 0], moved[:, 1]) / PREDICTION_TIMES[_SOON])
+    np.maximum.at(speeds, predicted.owners[counts], foreseen[counts])
     return speeds
 
 

@@ -95,7 +95,10 @@ def roll_out(
     for k in range(STEPS):
         metre = int(s + v * _LOOK_AHEAD)
         free = (caps[min(metre, last)] - v) / _LOOK_AHEAD
-        free = highest if free > highest else max(free, lowest)
+        if free > highest:
+            free = highest
+        elif free < lowest:
+            free = lowest
         wanted, because = free, ""
         for stop in stops:
             allowed = _for_stop(stop, s, v, k * STEP, config)
@@ -116,12 +119,13 @@ def roll_out(
 
 def _for_stop(stop: Stop, s: float, v: float, time: float, config: PlanningConfig) -> float:
     """Stopping there or, where the ego need not stop to arrive no earlier than the way becomes free, that."""
-    left = stop.until - time
-    if left <= 0.0:
-        return config.acceleration
     distance = stop.at - s
-    if 2.0 * distance > v * left:
-        return 2.0 * (distance - v * left) / (left * left)
+    if stop.until < math.inf:
+        left = stop.until - time
+        if left <= 0.0:
+            return config.acceleration
+        if 2.0 * distance > v * left:
+            return 2.0 * (distance - v * left) / (left * left)
     if v < _HOLD_SPEED and distance < _HOLD_GAP:
         allowed = _HOLD
     elif distance > _TOUCH:
@@ -155,10 +159,17 @@ def _moved(s: float, v: float, a: float, wanted: float, config: PlanningConfig) 
     """One step on, with the acceleration moving linearly towards `wanted` within the limits of jerk."""
     is_comfort = wanted >= -config.comfort_braking and a >= -config.comfort_braking
     change = (config.jerk if is_comfort else config.hard_jerk) * STEP
-    after = max(min(wanted, a + change), a - change, -config.hard_braking)
+    if wanted > a + change:
+        after = a + change
+    elif wanted < a - change:
+        after = a - change
+    else:
+        after = wanted
+    after = max(after, -config.hard_braking)
     if v <= 0.0 and after <= 0.0:
         return s, 0.0, 0.0
     reached = v + 0.5 * STEP * (a + after)
     if reached <= 0.0:
         return s + min(v * v / -(a + after), v * STEP), 0.0, 0.0
-    return s + max(STEP * (v + STEP * (2.0 * a + after) / 6.0), 0.0), reached, after
+    way = STEP * (v + STEP * (2.0 * a + after) / 6.0)
+    return (s + way if way > 0.0 else s), reached, after

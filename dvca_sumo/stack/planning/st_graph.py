@@ -104,6 +104,8 @@ def leading(graph: Graph, scene: Scene, shape: VehicleShape, config: PlanningCon
     Left out are unlikely ones that are not about to happen, and who drives behind the ego.
     """
     rows = np.flatnonzero(graph.occupied[: scene.moving].any(axis=1))
+    if not rows.size:
+        return [], []
     is_in_lane = (graph.gaps[rows, 0] < config.object_margin).tolist()
     is_ahead = (scene.futures.stations[rows, 0] > shape.centre).tolist()
     chances = scene.probabilities[rows].tolist()
