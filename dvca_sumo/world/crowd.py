@@ -27,7 +27,12 @@ class Crowd:
         self._sizes: Floats = np.empty((0, 3))  # length, width, reach
 
     def seen(
-        self, time: float, names: Sequence[str], motions: Sequence[float], lanes: Sequence[str], bodies: Mapping[str, Body]
+        self,
+        time: float,
+        names: Sequence[str],
+        motions: Sequence[float],
+        lanes: Sequence[str],
+        bodies: Mapping[str, Body],
     ) -> ObjectsTruth:
         """All bodies at `time` [s].
 
