@@ -43,6 +43,7 @@ _COLOURS = {
 }
 _NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
 _ANY_BRAKING = 1e4  # [m/s^2] SUMO's own driver, overruled, would warn of braking for the arrival at every step
+_MATCHED_WITHIN = 30.0  # [m] of a lane an ego is on the road; SUMO looks at every lane within that
 _GIVES_UP = (libsumo.TraCIException, libsumo.FatalTraCIError)
 _TWO_WHEELED = ("bicycle", "moped", "motorcycle", "scooter")
 
@@ -176,7 +177,8 @@ class Session:
         edge, _, index = lane.rpartition("_")
         x = truth.x + front * math.cos(truth.heading)
         y = truth.y + front * math.sin(truth.heading)
-        libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, 90.0 - math.degrees(truth.heading), keepRoute=2)
+        angle = 90.0 - math.degrees(truth.heading)
+        libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, angle, keepRoute=2, matchThreshold=_MATCHED_WITHIN)
         # SUMO derives a wrong speed on junction and opposite lanes; drivers behind must react to the true one.
         libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
 
