@@ -3,10 +3,12 @@
 import bisect
 import hashlib
 import math
+from typing import Any
 
 import msgspec
 import numpy as np
 
+from dvca_sumo.columns import Columns, packed
 from dvca_sumo.interventions import State, state_of
 from dvca_sumo.messages import COMPONENTS, Component, LocalizationEstimate, Message, MessageId
 from dvca_sumo.roadmap import Route
@@ -52,6 +54,13 @@ class Record(msgspec.Struct):
     simulated: float  # [s] of SUMO time, the way to the departure included
     substituted: float | None  # [s] time of the first message that an idealized substitute made
     digests: list[bytes]  # (steps,) of everything up to each world step, the oracles' findings excluded
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """To another process in columns: one by one, its messages would take as long as their making."""
+        values = msgspec.structs.asdict(self)
+        columns = {name: packed(values.pop(name)) for name in _LONG}
+        executions = {component: packed(made) for component, made in values.pop("executions").items()}
+        return _restored, (values, columns, executions)
 
     @property
     def digest(self) -> str:
@@ -103,6 +112,16 @@ def moved_on(moment: Moment, ego: EgoTruth) -> Moment:
     return Moment(
         ego, moment.shape, msgspec.structs.replace(moment.objects, time=ego.time, boxes=boxes), moment.signals
     )
+
+
+_LONG = ("path", "stations", "moments")
+
+
+def _restored(values: dict[str, Any], columns: dict[str, Columns], executions: dict[Component, Columns]) -> Record:
+    for name, column in columns.items():
+        values[name] = list(column.rows())
+    values["executions"] = {component: list(column.rows()) for component, column in executions.items()}
+    return Record(**values)
 
 
 class Digest:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from dvca_sumo.geometry.boxes import Floats, box_of, contact_times, corners, distances, within
+from dvca_sumo.geometry.boxes import Floats, box_of, contact_times, corners, distances, neighbours
 from dvca_sumo.messages import VehicleShape
 
 EGO = np.array([0.3, 0.2, 0.7, 4.6, 1.8])
@@ -57,7 +57,7 @@ def test_distance_between_an_edge_and_a_corner_turned_towards_it() -> None:
 def test_within_never_leaves_out_a_box_in_reach() -> None:
     boxes = random_boxes(2000, seed=2)
     close = np.flatnonzero(distances(EGO, boxes) <= 1.5)
-    kept = within(EGO, boxes, 1.5)
+    kept = neighbours(EGO, boxes).within(1.5)
     assert set(close) <= set(kept)
     assert len(kept) < 2000
 

@@ -134,3 +134,12 @@ def test_a_pickled_line_is_the_same() -> None:
     again = pickle.loads(pickle.dumps(line))  # noqa: S301 our own bytes
     assert np.array_equal(again.points, line.points)
     assert np.array_equal(again.curvatures, line.curvatures)
+
+
+def test_one_point_is_found_as_many_are() -> None:
+    line = winding()
+    points = line.points[3:] + np.random.default_rng(1).normal(0.0, 2.0, (len(line) - 3, 2))
+    for point, station in zip(points, line.stations[3:], strict=True):
+        between = (float(station) - 20.0, float(station) + 30.0)
+        found, _ = line.project(point, between=between)
+        assert line.station(*point.tolist(), between=between) == found[0]

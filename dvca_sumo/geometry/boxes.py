@@ -5,7 +5,7 @@ when their projections onto the length or width of one of them are.
 """
 
 import math
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -60,14 +60,22 @@ def radii(boxes: Floats) -> Floats:
     return 0.5 * np.hypot(boxes[..., 3], boxes[..., 4])
 
 
-def within(box: Floats, boxes: Floats, reach: float | Floats) -> npt.NDArray[np.int64]:
-    """Rows of `boxes` (n, 5), ascending, that may be closer than `reach` [m] to `box`; all others certainly are not.
+class Neighbours(NamedTuple):
+    """How far boxes may be from one box, by the circles around them: (n,) each."""
 
-    `reach` is one for all or (n,).
-    """
-    limit = radii(boxes) + (0.5 * math.hypot(box[3], box[4]) + reach)
+    squares: Floats  # [m^2] of the distance between the centres
+    touching: Floats  # [m] between the centres, beyond which the boxes certainly do not touch
+
+    def within(self, reach: float | Floats) -> npt.NDArray[np.int64]:
+        """Rows, ascending, that may be closer than `reach` [m], one for all or (n,); all others certainly are not."""
+        limit = self.touching + reach
+        return np.flatnonzero(self.squares <= limit * limit)
+
+
+def neighbours(box: Floats, boxes: Floats) -> Neighbours:
+    """The `boxes` (n, 5) as neighbours of `box` (5,)."""
     dx, dy = boxes[:, 0] - box[0], boxes[:, 1] - box[1]
-    return np.flatnonzero(dx * dx + dy * dy <= limit * limit)
+    return Neighbours(dx * dx + dy * dy, radii(boxes) + 0.5 * math.hypot(box[3], box[4]))
 
 
 def distances(box: Floats, boxes: Floats) -> Floats:
@@ -101,8 +109,10 @@ def contact_times(box: Floats, velocity: Floats, boxes: Floats, velocities: Floa
     """
     turns = boxes[:, 2] - box[2]
     reaches = _reaches(box, boxes, np.cos(turns), np.sin(turns))
-    centres = _on_axes(boxes[:, :2] - box[:2], box, boxes)
-    speeds = _on_axes(velocities - velocity, box, boxes)
+    vectors = np.empty((2, len(boxes), 2))
+    np.subtract(boxes[:, :2], box[:2], out=vectors[0])
+    np.subtract(velocities, velocity, out=vectors[1])
+    centres, speeds = _on_axes(vectors, box, boxes)
     # A motion too slow to matter stands for none: its interval is as good as endless, or as good as never.
     speeds = np.where(np.abs(speeds) < _STILL, _STILL, speeds)
     one, other = (-reaches - centres) / speeds, (reaches - centres) / speeds
@@ -112,13 +122,13 @@ def contact_times(box: Floats, velocity: Floats, boxes: Floats, velocities: Floa
 
 
 def _on_axes(vectors: Floats, box: Floats, boxes: Floats) -> Floats:
-    """Vectors (n, 2) along length and width of `box`, then of their own row of `boxes`: (n, 4)."""
-    found = np.empty((len(boxes), 4))
-    x, y = vectors[:, 0], vectors[:, 1]
+    """Vectors (..., n, 2) along length and width of `box`, then of their own row of `boxes`: (..., n, 4)."""
+    found = np.empty((*vectors.shape[:-1], 4))
+    x, y = vectors[..., 0], vectors[..., 1]
     for column, heading in ((0, box[2]), (2, boxes[:, 2])):
         cos, sin = np.cos(heading), np.sin(heading)
-        found[:, column] = x * cos + y * sin
-        found[:, column + 1] = y * cos - x * sin
+        found[..., column] = x * cos + y * sin
+        found[..., column + 1] = y * cos - x * sin
     return found
 
 

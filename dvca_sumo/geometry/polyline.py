@@ -5,6 +5,8 @@ half a metre to a metre of the vertex (half a segment where segments are short),
 every line at a fixed offset, is continuous.
 """
 
+import math
+from bisect import bisect_left, bisect_right
 from functools import cached_property
 
 import numpy as np
@@ -83,11 +85,43 @@ class Polyline:
         perpendicular.
         """
         low, high = (0.0, self.length) if between is None else self._window(*between)
-        first = int(self.stations[1:-1].searchsorted(low, side="right"))
-        last = max(int(self.stations[1:].searchsorted(high)) + 1, first + 1)
         xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
         local = np.ones((len(xy), 3))
         np.subtract(xy, self.points[0], out=local[:, :2])
+        first, nearest, squares = self._nearest(local, low, high)
+        segments = squares.argmin(axis=1)
+        stations = self.stations[segments + first] + nearest[np.arange(len(xy)), segments]
+        return self._refined(xy, stations, low, high)
+
+    def station(self, x: float, y: float, *, between: tuple[float, float]) -> float:
+        """The station of one point, as `project` finds it."""
+        low, high = self._window(*between)
+        _, origin_x, origin_y, _, _ = self._rows[0]
+        first, nearest, squares = self._nearest(np.array([[x - origin_x, y - origin_y, 1.0]]), low, high)
+        segment = int(squares.argmin())
+        station = self._station_list[first + segment] + nearest.item(segment)
+        segment = bisect_right(self._station_list, station, 1, len(self) - 1) - 1  # at a vertex, the one after it
+        from_station, from_x, from_y, unit_x, unit_y = self._rows[segment]
+        knots = self._turn_list
+        knot = bisect_right(knots, station, 1, len(knots) - 1) - 1
+        turning = self._turn_rates.item(knot)
+        heading = self._turn_headings.item(knot) + turning * (station - knots[knot])
+        cosine, sine = math.cos(heading), math.sin(heading)
+        dx = x - from_x - (station - from_station) * unit_x
+        dy = y - from_y - (station - from_station) * unit_y
+        fold = turning * (dy * cosine - dx * sine)
+        step = (dx * cosine + dy * sine) / (1.0 - fold) if abs(fold) < _FOLD else 0.0
+        return min(max(station + step, low), high)
+
+    def _nearest(self, local: Floats, low: float, high: float) -> tuple[int, Floats, Floats]:
+        """First segment searched, and of each one from there the nearest place along it and its squared distance.
+
+        The squared distance (m, segments) is less the point's own square. `local` (m, 3) holds x, y
+        relative to the first point, and 1.
+        """
+        stations = self._station_list
+        first = bisect_right(stations, low, 1, len(stations) - 1) - 1
+        last = max(bisect_left(stations, high, 1), first + 1)
         along = local @ self._along[:, first:last]
         nearest = np.maximum(along, 0.0)
         np.minimum(nearest, self._lengths[first:last], out=nearest)
@@ -95,9 +129,7 @@ class Polyline:
         along += nearest
         along *= nearest
         along += local @ self._from_start[:, first:last]
-        segments = along.argmin(axis=1)
-        stations = self.stations[first + segments] + nearest[np.arange(len(xy)), segments]
-        return self._refined(xy, stations, low, high)
+        return first, nearest, along
 
     def _refined(self, xy: Floats, stations: Floats, low: float, high: float) -> tuple[Floats, Floats]:
         """One Newton step from the nearest point to where the interpolated normal meets the point.
@@ -154,6 +186,24 @@ class Polyline:
     def _turn_rates(self) -> Floats:
         gaps = np.diff(self._turn_stations)
         return np.diff(self._turn_headings) / np.where(gaps > 0.0, gaps, np.inf)
+
+    # Numbers looked up one at a time are quicker to reach in lists.
+
+    @cached_property
+    def _station_list(self) -> list[float]:
+        stations: list[float] = self.stations.tolist()
+        return stations
+
+    @cached_property
+    def _turn_list(self) -> list[float]:
+        stations: list[float] = self._turn_stations.tolist()
+        return stations
+
+    @cached_property
+    def _rows(self) -> list[list[float]]:
+        """Where each segment begins (station, x, y), and its direction."""
+        rows: list[list[float]] = np.column_stack((self.stations[:-1], self.points[:-1], self._units)).tolist()
+        return rows
 
     @cached_property
     def _along(self) -> Floats:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dvca_sumo.geometry.boxes import corners, within
+from dvca_sumo.geometry.boxes import corners
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.oracles.place import Places
 from dvca_sumo.truth import Moment
@@ -24,7 +24,7 @@ def ahead(places: Places, moment: Moment, reach: float, margin: float = 0.0, row
     Only `rows` are looked at when they are given.
     """
     place, objects = places.at(moment), moment.objects
-    rows = within(place.box, objects.boxes, reach) if rows is None else rows
+    rows = places.within(moment, reach) if rows is None else rows
     if rows.size == 0:
         return Ahead(rows, np.empty(0), np.empty(0))
     stations, offsets = places.along(corners(objects.boxes[rows]).reshape(-1, 2), reach)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from dvca_sumo.geometry.boxes import distances, within
+from dvca_sumo.geometry.boxes import distances
 from dvca_sumo.messages import Floats
 from dvca_sumo.oracles.findings import Findings
 from dvca_sumo.oracles.place import Places
@@ -48,7 +48,7 @@ class Collision:
         reach = self._thresholds.safe_distance
         stands = abs(moment.ego.speed) <= self._thresholds.standing_speed
         near: dict[str, float] = {}
-        rows = within(box, boxes, reach)
+        rows = self._places.within(moment, reach)
         if rows.size:
             for row, distance in zip(rows.tolist(), distances(box, boxes[rows]).tolist(), strict=True):
                 name = moment.objects.ids[row]

@@ -40,7 +40,7 @@ class NoProgress:
         route = places.route
         spans = [(line.station - _JUNCTION_REACH, line.exit_station) for line in route.stop_lines]
         spans += [(crossing.start_station - _JUNCTION_REACH, crossing.end_station) for crossing in route.crossings]
-        self._conflicts = np.array(spans, dtype=np.float64).reshape(-1, 2)
+        self._conflicts = spans
         self._signs = [line for line in route.stop_lines if line.control in (Control.STOP, Control.ALL_WAY_STOP)]
         self._signals = [line for line in route.stop_lines if line.control is Control.SIGNAL]
         self._standing_since = math.inf  # [s]
@@ -96,10 +96,9 @@ class NoProgress:
             return True
         if self._is_at_sign(place.station) and moment.time - self._standing_since < _SIGN_TIME:
             return True
-        if ahead(self._places, moment, _OBJECT_REACH, _OBJECT_MARGIN).rows.size:
+        if any(begin <= place.station <= end for begin, end in self._conflicts) and _has_traffic(moment):
             return True
-        is_at_conflict = (self._conflicts[:, 0] <= place.station) & (place.station <= self._conflicts[:, 1])
-        return bool(is_at_conflict.any()) and _has_traffic(moment)
+        return bool(ahead(self._places, moment, _OBJECT_REACH, _OBJECT_MARGIN).rows.size)
 
     def _is_at_sign(self, station: float) -> bool:
         return any(0.0 <= line.station - station <= _SIGN_REACH for line in self._signs)

@@ -1,14 +1,15 @@
 """Where the ego truly is on its route, looked up once a moment for all oracles."""
 
 import math
+from bisect import bisect_right
 
 import msgspec
 import numpy as np
 
-from dvca_sumo.geometry.boxes import box_of
+from dvca_sumo.geometry.boxes import Neighbours, box_of, neighbours
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap, Route
-from dvca_sumo.truth import Moment
+from dvca_sumo.truth import Moment, ObjectsTruth
 
 OFF_ROUTE = 15.0  # [m] farther from its line than this the ego is no longer on the route
 
@@ -25,9 +26,9 @@ class Place(msgspec.Struct, frozen=True):
     station: float  # [m] of the middle of the front bumper
     offset: float  # [m]
     row: int  # of the route's per-station arrays, at the front bumper
-    corner_stations: Floats  # (4,) [m] front left, rear left, rear right, front right
-    corner_offsets: Floats  # (4,) [m]
-    corner_rows: Integers  # (4,)
+    corner_stations: list[float]  # (4,) [m] front left, rear left, rear right, front right
+    corner_offsets: list[float]  # (4,) [m]
+    corner_rows: list[int]  # (4,)
 
     @property
     def is_on_route(self) -> bool:
@@ -45,6 +46,8 @@ class Places:
         self.route = route
         self._roadmap = roadmap
         self._last: Place | None = None
+        self._stations = route.line.stations.tolist()
+        self._neighbours: tuple[ObjectsTruth, Neighbours] | None = None
         self._anchor = route.start  # [m] last station known to be right ...
         self._anchor_time: float | None = None  # [s] ... and when
 
@@ -58,6 +61,13 @@ class Places:
     def is_empty(self) -> bool:
         """Whether no place was ever asked for: nothing of the run was seen."""
         return self._last is None
+
+    def within(self, moment: Moment, reach: float | Floats) -> Integers:
+        """Rows of the objects that may be closer than `reach` [m] to the ego; see `Neighbours.within`."""
+        objects = moment.objects
+        if self._neighbours is None or self._neighbours[0] is not objects:
+            self._neighbours = objects, neighbours(self.at(moment).box, objects.boxes)
+        return self._neighbours[1].within(reach)
 
     def along(self, points: Floats, reach: float) -> tuple[Floats, Floats]:
         """Stations and offsets [m] of points (m, 2) near the ego's last place.
@@ -97,16 +107,17 @@ class Places:
             ]
         )
         stations, offsets = self._projected(points, moment.time)
-        rows = self.rows(stations)
+        last = len(self.route.lane_ids) - 1
+        row, *corner_rows = (min(max(bisect_right(self._stations, one) - 1, 0), last) for one in stations.tolist())
         place = Place(
             time=moment.time,
             box=box_of(ego.x, ego.y, ego.heading, shape),
             station=float(stations[0]),
             offset=float(offsets[0]),
-            row=int(rows[0]),
-            corner_stations=stations[1:],
-            corner_offsets=offsets[1:],
-            corner_rows=rows[1:],
+            row=row,
+            corner_stations=stations[1:].tolist(),
+            corner_offsets=offsets[1:].tolist(),
+            corner_rows=corner_rows,
         )
         if place.is_on_route or self._anchor_time is None:
             self._anchor_time = moment.time

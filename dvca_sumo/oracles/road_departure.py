@@ -34,12 +34,13 @@ class RoadDeparture:
         self._dwell = thresholds.lane_dwell
         self._since: float | None = None  # [s] of the current episode
         self._is_reported = False
-        self._edges: tuple[Floats, Floats] | None = None  # (n,) left, right [m]; endless where not known
+        self._edges: tuple[list[float], list[float]] | None = None  # (n,) left, right [m]; endless where not known
 
     def observe(self, moment: Moment) -> Violation | None:
         """See `Oracle`."""
         if self._edges is None:
-            self._edges = _edges(self._places.route, moment.shape)
+            left, right = _edges(self._places.route, moment.shape)
+            self._edges = left.tolist(), right.tolist()
         beyond, side = self._beyond(self._places.at(moment), *self._edges)
         if not beyond > self._tolerance:
             self._since, self._is_reported = None, False
@@ -53,17 +54,17 @@ class RoadDeparture:
 
     def conclude(self, ended: Ending) -> Judgement:  # noqa: ARG002  the answer holds for whatever part was seen
         """See `Oracle`."""
-        has_edges = self._edges is None or all(np.isfinite(edge).all() for edge in self._edges)
+        has_edges = self._edges is None or bool(np.isfinite(self._edges).all())
         return self._findings.judgement("" if has_edges else "the map has no road edges on parts of the route")
 
-    def _beyond(self, place: Place, left: Floats, right: Floats) -> tuple[float, str]:
+    def _beyond(self, place: Place, left: list[float], right: list[float]) -> tuple[float, str]:
         """How far the outermost corner is beyond which edge [m]; negative inside."""
         if not place.is_on_route:
             return abs(place.offset) - OFF_ROUTE + self._tolerance, "left" if place.offset > 0.0 else "right"
-        stations, offsets, rows = place.corner_stations, place.corner_offsets, place.corner_rows
-        is_judged = (stations > 0.0) & (stations < self._places.route.line.length)
-        most_left = float(np.where(is_judged, offsets - left[rows], -np.inf).max())
-        most_right = float(np.where(is_judged, right[rows] - offsets, -np.inf).max())
+        most_left, most_right, length = -math.inf, -math.inf, self._places.route.line.length
+        for station, offset, row in zip(place.corner_stations, place.corner_offsets, place.corner_rows, strict=True):
+            if 0.0 < station < length:
+                most_left, most_right = max(most_left, offset - left[row]), max(most_right, right[row] - offset)
         return (most_left, "left") if most_left >= most_right else (most_right, "right")
 
 

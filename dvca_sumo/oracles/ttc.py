@@ -5,7 +5,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from dvca_sumo.geometry.boxes import contact_times, within
+from dvca_sumo.geometry.boxes import contact_times
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.oracles.ahead import ahead
 from dvca_sumo.oracles.findings import Findings
@@ -64,13 +64,16 @@ class TimeToCollision:
         velocity = np.array([ego.speed * math.cos(ego.heading), ego.speed * math.sin(ego.heading)])
         relative = np.hypot(objects.velocities[:, 0] - velocity[0], objects.velocities[:, 1] - velocity[1])
         # Along a bend the gap may close although the velocities are equal.
-        rows = within(box, objects.boxes, np.maximum(relative, abs(ego.speed)) * self._horizon)
+        rows = self._places.within(moment, np.maximum(relative, abs(ego.speed)) * self._horizon)
         if rows.size == 0:
             return rows, np.empty(0)
         fronts = _foremost(box, objects.boxes[rows])
         # What lies wholly behind closes in by its own doing.
         if ego.speed > 0.0:
-            rows, fronts = rows[fronts >= -0.5 * box[3]], fronts[fronts >= -0.5 * box[3]]
+            is_beside = fronts >= -0.5 * box[3]
+            rows, fronts = rows[is_beside], fronts[is_beside]
+            if rows.size == 0:
+                return rows, np.empty(0)
         times = contact_times(box, velocity, objects.boxes[rows], objects.velocities[rows], self._horizon)
         is_leader = fronts > 0.5 * box[3]
         if ego.speed > 0.0 and is_leader.any():

@@ -34,6 +34,7 @@ TICKS_PER_STEP = 10
 _ARRIVED_WITHIN = 3.0  # [m]
 _LOST_BEYOND = 60.0  # [m] past its destination an ego will not come back
 _PHASE_STREAM = 101
+_CHANNELS = {component: component.value for component in COMPONENTS}  # an enum's value is slow to ask for
 
 Answer = TypeVar("Answer")
 
@@ -67,7 +68,7 @@ class Drive:
         self._stack = stack
         self._task = task
         self._latest = latest
-        self._phases = _phases(task)
+        self._due = _due(task)
         self._interventions = {
             component: [(one, Gate(one.selection)) for one in task.interventions if one.component == component]
             for component in COMPONENTS
@@ -133,9 +134,8 @@ class Drive:
             truth = self.ego.vehicle.truth
             self._path.append(truth)
             self._stations.append(station)
-            for component in COMPONENTS:
-                if self._phases[component] in (None, phase):
-                    self._execute(component, moment)
+            for component in self._due[phase]:
+                self._execute(component, moment)
             command = self._channels.control
             assert command is not None  # control always answers
             try:
@@ -175,7 +175,7 @@ class Drive:
         )
 
     def _execute(self, component: Component, moment: Moment) -> None:
-        index = len(self._executions[component])
+        made = self._executions[component]
         try:
             message = self._steps[component](moment)
         except Exception as error:
@@ -184,15 +184,14 @@ class Drive:
             raise StackError(f"{component} raised {said} in cycle {cycle} ({self._path[-1].time:.2f} s)") from error
         if message is None:  # its input has not arrived yet
             return
-        published = self._intervened(component, index, message, moment)
-        self._executions[component].append(Execution(self._tick, published))
+        published: Message | None = message
+        if self._interventions[component]:
+            published = self._intervened(component, len(made), message, moment)
+        made.append(Execution(self._tick, published))
         if published is not None:
-            setattr(self._channels, component.value, published)
+            setattr(self._channels, _CHANNELS[component], published)
 
     def _intervened(self, component: Component, index: int, message: Message, moment: Moment) -> Message | None:
-        interventions = self._interventions[component]
-        if not interventions:
-            return message
         truth = self._path[-1]
         believed = message if isinstance(message, LocalizationEstimate) else self._channels.localization
         assert believed is not None  # localization is the first to speak
@@ -208,7 +207,7 @@ class Drive:
             futures=self._task.futures,
         )
         result: Message | None = message
-        for intervention, gate in interventions:
+        for intervention, gate in self._interventions[component]:
             if gate.admits(occasion):
                 result = self._replaced(intervention, result, occasion)
         return result
@@ -292,15 +291,13 @@ def _checked(answer: object, kind: type[Answer]) -> Answer:
     return answer
 
 
-def _phases(task: Task) -> dict[Component, int | None]:
-    """Tick within the world step at which each component runs; None: at every tick."""
+def _due(task: Task) -> tuple[tuple[Component, ...], ...]:
+    """The components that run at each tick of a world step, in their order."""
     drawn = [0, 0, 0]
     if task.jitter is not None:
         drawn = [int(draw * TICKS_PER_STEP) for draw in uniforms(task.seed, _PHASE_STREAM, 0, [0], 3)[0]]
-    return {
-        Component.LOCALIZATION: None,
-        Component.PERCEPTION: drawn[0],
-        Component.PREDICTION: drawn[1],
-        Component.PLANNING: drawn[2],
-        Component.CONTROL: None,
-    }
+    slower = dict(zip((Component.PERCEPTION, Component.PREDICTION, Component.PLANNING), drawn, strict=True))
+    return tuple(
+        tuple(component for component in COMPONENTS if slower.get(component, tick) == tick)
+        for tick in range(TICKS_PER_STEP)
+    )

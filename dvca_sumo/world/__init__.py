@@ -50,16 +50,16 @@ class Ego:
         """Where its rear axle is along the route [m]; asked for once a world step at least."""
         truth = self.vehicle.truth
         if truth.time != self._station_time:
-            point = np.array([[truth.x, truth.y]])
-            stations, _ = self.route.line.project(point, between=(self._station - 20.0, self._station + 30.0))
-            self._station, self._station_time = float(stations[0]), truth.time
+            window = (self._station - 20.0, self._station + 30.0)
+            self._station = self.route.line.station(truth.x, truth.y, between=window)
+            self._station_time = truth.time
         return self._station
 
     def lane(self) -> str:
         """The route's lane under its front bumper, for SUMO's map matching."""
         line = self.route.line
         front = min(self.station() + self.shape.front, line.length)
-        return self.route.lane_ids[int(np.searchsorted(line.stations, front, side="right")) - 1]
+        return self.route.lane_ids[int(line.stations.searchsorted(front, side="right")) - 1]
 
 
 class World:

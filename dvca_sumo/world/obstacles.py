@@ -48,6 +48,8 @@ def boxes_of_polygon(shape: Sequence[tuple[float, float]], is_filled: bool, line
 
 def joined(moving: ObjectsTruth, obstacles: Obstacles, centre: tuple[float, float], radius: float) -> ObjectsTruth:
     """Moving bodies first, then the obstacles within `radius` [m] of `centre`, lengths counted in."""
+    if not obstacles.names:
+        return moving
     gaps = np.hypot(obstacles.boxes[:, 0] - centre[0], obstacles.boxes[:, 1] - centre[1]) - obstacles.boxes[:, 3] / 2.0
     near = np.flatnonzero(gaps < radius)
     if near.size == 0:

@@ -8,6 +8,7 @@ Rules of this file:
 """
 
 import math
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ import traci.constants as tc
 from dvca_sumo.messages import ObjectClass, SignalColour
 from dvca_sumo.scenario import Scenario, ScenarioError, silenced
 from dvca_sumo.truth import EgoTruth, ObjectsTruth
+from dvca_sumo.world.crowd import Body, Crowd
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
@@ -40,9 +42,8 @@ _COLOURS = {
     "O": SignalColour.OFF,
 }
 _NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
-_Row = tuple[float, float, float, float, float, float]  # box and speed
-_Body = tuple[str, ObjectClass, _Row, str]  # name, class, row, lane
 _ANY_BRAKING = 1e4  # [m/s^2] SUMO's own driver, overruled, would warn of braking for the arrival at every step
+_MATCHED_WITHIN = 30.0  # [m] of a lane an ego is on the road; SUMO looks at every lane within that
 _GIVES_UP = (libsumo.TraCIException, libsumo.FatalTraCIError)
 _TWO_WHEELED = ("bicycle", "moped", "motorcycle", "scooter")
 
@@ -88,7 +89,9 @@ class Session:
         except _GIVES_UP as error:
             libsumo.close()  # else what it had loaded would stay
             raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {_in_one_line(error)}") from None
-        self._bodies: dict[str, tuple[ObjectClass, float, float]] = {}
+        self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
+        self._crowds: dict[str, Crowd] = {}  # by ego
+        self._signals: dict[tuple[str, ...], _Signals] = {}  # by the heads asked for
 
     @property
     def time(self) -> float:
@@ -162,6 +165,7 @@ class Session:
         of.setWidth(entry.ego, entry.width)
         of.setVehicleClass(entry.ego, entry.vehicle_class)
         of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
+        self._crowds[entry.ego] = Crowd()
         of.subscribeContext(entry.ego, tc.CMD_GET_VEHICLE_VARIABLE, radius, _VEHICLE)
         of.subscribeContext(entry.ego, tc.CMD_GET_PERSON_VARIABLE, radius, _PERSON)
 
@@ -173,39 +177,39 @@ class Session:
         edge, _, index = lane.rpartition("_")
         x = truth.x + front * math.cos(truth.heading)
         y = truth.y + front * math.sin(truth.heading)
-        libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, 90.0 - math.degrees(truth.heading), keepRoute=2)
+        angle = 90.0 - math.degrees(truth.heading)
+        libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, angle, keepRoute=2, matchThreshold=_MATCHED_WITHIN)
         # SUMO derives a wrong speed on junction and opposite lanes; drivers behind must react to the true one.
         libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
 
     def objects(self, ego: str) -> ObjectsTruth:
         """Every moving body near an adopted ego: vehicles (parked ones too), people on foot."""
-        bodies: list[_Body] = []
+        names: list[str] = []
+        motions: list[float] = []
+        lanes: list[str] = []
         for name, values in libsumo.vehicle.getContextSubscriptionResults(ego).items():
+            is_person = tc.VAR_POSITION3D in values
             if tc.VAR_POSITION in values and name != ego and abs(values[tc.VAR_POSITION][0]) < _NOWHERE:
-                bodies.append(self._vehicle(name, values))
-            if tc.VAR_POSITION3D in values and not values[tc.VAR_VEHICLE]:
-                bodies.append(self._person(name, values))
-        rows = np.array([body[2] for body in bodies], dtype=np.float64).reshape(-1, 6)
-        boxes, speeds = rows[:, :5], rows[:, 5:]
-        return ObjectsTruth(
-            self.time,
-            tuple(body[0] for body in bodies),
-            np.array([body[1] for body in bodies], dtype=np.int64),
-            boxes,
-            speeds * np.array([np.cos(boxes[:, 2]), np.sin(boxes[:, 2])]).T,
-            tuple(body[3] for body in bodies),
-        )
+                names.append(self._vehicle(name))
+                motions += values[tc.VAR_POSITION]
+                # A person of the same name overwrote the other values.
+                motions += _turn(libsumo.vehicle, name) if is_person else (values[tc.VAR_ANGLE], values[tc.VAR_SPEED])
+                lanes.append(sys.intern(values[tc.VAR_LANE_ID]))  # met again in thousands of moments
+            if is_person and not values[tc.VAR_VEHICLE]:
+                is_mixed = tc.VAR_POSITION in values
+                names.append(self._person(name))
+                motions += values[tc.VAR_POSITION3D][:2]
+                motions += _turn(libsumo.person, name) if is_mixed else (values[tc.VAR_ANGLE], values[tc.VAR_SPEED])
+                lanes.append("")
+        return self._crowds[ego].seen(self.time, names, motions, lanes, self._bodies)
 
-    def signals(self, signal_ids: Sequence[str]) -> dict[str, SignalColour]:
-        """Colours of signal heads, given as "traffic light/link index"."""
-        states: dict[str, str] = {}
-        colours: dict[str, SignalColour] = {}
-        for signal in signal_ids:
-            light, _, link = signal.rpartition("/")
-            if light not in states:
-                states[light] = libsumo.trafficlight.getRedYellowGreenState(light)
-            colours[signal] = _COLOURS[states[light][int(link)]]
-        return colours
+    def signals(self, signal_ids: tuple[str, ...]) -> dict[str, SignalColour]:
+        """Colours of signal heads, given as "traffic light/link index"; not to be written to."""
+        known = self._signals.get(signal_ids)
+        if known is None:
+            known = self._signals[signal_ids] = _Signals(signal_ids)
+        state_of = libsumo.trafficlight.getRedYellowGreenState
+        return known.showing({light: state_of(light) for light in known.lights})
 
     def obstacles(self) -> Obstacles:
         """The scenario's POIs and polygons that are bodies."""
@@ -231,33 +235,44 @@ class Session:
         """End the simulation; the process may start another."""
         libsumo.close()
 
-    def _vehicle(self, name: str, values: dict[int, Any]) -> _Body:
+    def _vehicle(self, name: str) -> str:
+        """The key of a vehicle among the bodies."""
         if name not in self._bodies:
             of = libsumo.vehicle
-            is_two_wheeled = of.getVehicleClass(name) in _TWO_WHEELED
-            kind = ObjectClass.BICYCLE if is_two_wheeled else ObjectClass.VEHICLE
-            self._bodies[name] = (kind, of.getLength(name), of.getWidth(name))
-        kind, length, width = self._bodies[name]
-        # A person of the same name overwrote the other values.
-        is_mixed = tc.VAR_POSITION3D in values
-        heading = math.radians(90.0 - (libsumo.vehicle.getAngle(name) if is_mixed else values[tc.VAR_ANGLE]))
-        speed = libsumo.vehicle.getSpeed(name) if is_mixed else values[tc.VAR_SPEED]
-        x, y = values[tc.VAR_POSITION]
-        half = length / 2.0
-        box = (x - half * math.cos(heading), y - half * math.sin(heading), heading, length, width)
-        return name, kind, (*box, speed), values[tc.VAR_LANE_ID]
+            kind = ObjectClass.BICYCLE if of.getVehicleClass(name) in _TWO_WHEELED else ObjectClass.VEHICLE
+            length = of.getLength(name)
+            self._bodies[name] = Body(kind, length, of.getWidth(name), length / 2.0)
+        return name
 
-    def _person(self, name: str, values: dict[int, Any]) -> _Body:
+    def _person(self, name: str) -> str:
+        """The key of a person among the bodies."""
         key = f"person:{name}"
         if key not in self._bodies:
             of = libsumo.person
-            self._bodies[key] = (ObjectClass.PEDESTRIAN, of.getLength(name), of.getWidth(name))
-        kind, length, width = self._bodies[key]
-        is_mixed = tc.VAR_POSITION in values
-        heading = math.radians(90.0 - (libsumo.person.getAngle(name) if is_mixed else values[tc.VAR_ANGLE]))
-        speed = libsumo.person.getSpeed(name) if is_mixed else values[tc.VAR_SPEED]
-        x, y, _ = values[tc.VAR_POSITION3D]
-        return key, kind, (x, y, heading, length, width, speed), ""
+            self._bodies[key] = Body(ObjectClass.PEDESTRIAN, of.getLength(name), of.getWidth(name), 0.0)
+        return key
+
+
+class _Signals:
+    """Signal heads of one route; what they show is put together anew only when a light has changed."""
+
+    def __init__(self, signal_ids: tuple[str, ...]) -> None:
+        parts = [(signal, *signal.rpartition("/")[::2]) for signal in signal_ids]
+        self._heads = [(signal, light, int(link)) for signal, light, link in parts]
+        self.lights = tuple(dict.fromkeys(light for _, light, _ in self._heads))
+        self._states: dict[str, str] = {}
+        self._colours: dict[str, SignalColour] = {}
+
+    def showing(self, states: dict[str, str]) -> dict[str, SignalColour]:
+        """Colours by signal id, `states` being SUMO's by traffic light."""
+        if states != self._states:
+            self._states = states
+            self._colours = {signal: _COLOURS[states[light][link]] for signal, light, link in self._heads}
+        return self._colours
+
+
+def _turn(domain: Any, name: str) -> tuple[float, float]:
+    return domain.getAngle(name), domain.getSpeed(name)
 
 
 def _in_one_line(error: Exception) -> str:

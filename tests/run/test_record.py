@@ -1,5 +1,7 @@
 """What a run leaves: marks, beliefs and truth at any tick, and a digest that notices everything."""
 
+import operator
+import pickle
 from pathlib import Path
 
 import msgspec
@@ -109,3 +111,15 @@ def test_a_record_survives_the_way_between_processes(record: Record) -> None:
     assert isinstance(message, TrackedObjects)
     assert message.boxes.shape == (len(message.ids), 5)
     assert record.route.line.length > 60.0
+
+
+def test_a_record_comes_out_of_another_process_as_it_was(record: Record) -> None:
+    sent = pickle.loads(pickle.dumps(record))  # noqa: S301 - made in the line itself
+    everything = operator.attrgetter("executions", "path", "stations", "moments", "violations", "judgements", "digests")
+    assert Digest().step(everything(sent)) == Digest().step(everything(record))
+    assert sent.path == record.path
+    assert sent.digest == record.digest
+    for component in COMPONENTS:
+        for one, other in zip(sent.executions[component], record.executions[component], strict=True):
+            assert (one.tick, type(one.message)) == (other.tick, type(other.message))
+    assert sent.moments[3].objects.boxes.shape == record.moments[3].objects.boxes.shape

@@ -185,7 +185,7 @@ def test_an_ego_past_the_end_of_the_net_stays(tmp_path: Path, street: Path) -> N
     assert asked(config, 60, lambda sumo: sumo.vehicle.getIDList(), speed=10.0) == ("ego",)
 
 
-@pytest.mark.parametrize("left", [-3.0, 3.0])
+@pytest.mark.parametrize("left", [-3.0, 3.0, 60.0])
 def test_an_ego_beside_the_road_is_where_it_is(tmp_path: Path, street: Path, left: float) -> None:
     config = scenario_file(tmp_path, street, STANDING)
     last = watched(config, 50, speed=5.0, left=left)[-1]
