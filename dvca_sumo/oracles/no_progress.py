@@ -88,7 +88,7 @@ class NoProgress:
             self._blind = f"the colour of the signal ahead was not known at {moment.time:.1f} s"
 
     def has_reason(self, moment: Moment) -> bool:
-        """Whether there is a reason to stand: destination, signal, stop sign, something in the way, crossing traffic."""
+        """Whether there is a reason to stand: destination, signal, stop sign, something in the way or crossing."""
         place, route = self._places.at(moment), self._places.route
         if abs(place.station - route.destination) <= self._thresholds.destination_tolerance:
             return True
