@@ -64,7 +64,7 @@ def responsible_component(dtest: Dtest, record: Record, time: float) -> Componen
     search = _Backwards(dtest, record, time)
     all_ideal = search.gallop_together()
     singles = search.gallop_singly() if all_ideal is Outcome.SAFE else search.vector()
-    return _concluded(all_ideal, singles)
+    return concluded(all_ideal, singles)
 
 
 def mark_before(record: Record, component: Component, time: float, back: float | None) -> MessageMark | None:
@@ -133,7 +133,8 @@ class _Backwards:
         return self._dtest.ask_all([Question(ideal, mark) for ideal, mark in zip(ideals, marks, strict=True)])
 
 
-def _concluded(all_ideal: Outcome, singles: dict[Component, Outcome]) -> ComponentAnswer:
+def concluded(all_ideal: Outcome, singles: dict[Component, Outcome]) -> ComponentAnswer:
+    """What the vector of counterfactuals says; see `responsible_component`."""
     enough = tuple(component for component in SUBSTITUTABLE if singles[component] is Outcome.SAFE)
 
     def answer(verdict: Verdict, component: Component | None, reason: str) -> ComponentAnswer:

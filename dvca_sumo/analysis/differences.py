@@ -25,7 +25,7 @@ from dvca_sumo.messages import (
 from dvca_sumo.record import Record
 from dvca_sumo.stack.ideal import SUBSTITUTES
 
-_MATCHED_WITHIN = 4.0  # [m] a tracked object farther from the true one is not it
+MATCHED_WITHIN = 4.0  # [m] a tracked object farther from the true one is not it
 _LISTED = 3
 _NOTICEABLE = 0.05  # [m] or comparable, see `Difference.size`: less does not show in the text
 _NOUNS = {
@@ -55,7 +55,7 @@ def differences(record: Record, message: MessageId, futures: Futures, focus: str
     execution = record.executions[message.component][message.index]
     if substitute is None or execution.message is None:
         return ()
-    occasion = _occasion(record, message, execution.tick, futures)
+    occasion = occasion_of(record, message, futures)
     said, ideal = execution.message, substitute(occasion)
     found: list[Difference] = []
     if isinstance(said, LocalizationEstimate) and isinstance(ideal, LocalizationEstimate):
@@ -70,11 +70,15 @@ def differences(record: Record, message: MessageId, futures: Futures, focus: str
     return tuple(sorted(noticeable, key=lambda one: -one.size)[:_LISTED])
 
 
-def _occasion(record: Record, message: MessageId, tick: int, futures: Futures) -> Occasion:
+def occasion_of(record: Record, message: MessageId, futures: Futures) -> Occasion:
+    """The making of a recorded message."""
+    tick = record.executions[message.component][message.index].tick
     ego = record.path[tick]
     trajectory: Trajectory | None = None
     for execution in record.executions[Component.PLANNING]:
-        if execution.tick <= tick and isinstance(execution.message, Trajectory):
+        if execution.tick > tick:
+            break
+        if isinstance(execution.message, Trajectory):
             trajectory = execution.message
     return Occasion(
         message=message,
@@ -104,7 +108,7 @@ def _of_objects(said: TrackedObjects, occasion: Occasion, focus: str | None) -> 
     for row in _relevant(occasion, focus):
         name = truth.ids[row].partition(":")[2] or truth.ids[row]
         box, velocity = _believed(occasion, row)
-        if not len(said.ids) or _gaps(said, box).min() > _MATCHED_WITHIN:
+        if not len(said.ids) or _gaps(said, box).min() > MATCHED_WITHIN:
             text = f"object {name} missing; truth: {_seen(occasion, row)}"
             found.append(Difference("objects", text, math.inf))
             continue
@@ -140,7 +144,7 @@ def _of_predictions(said: PredictedObjects, occasion: Occasion, focus: str | Non
     for row in _relevant(occasion, focus):
         name = truth.ids[row].partition(":")[2] or truth.ids[row]
         box, _ = _believed(occasion, row)
-        if not len(said.objects.ids) or _gaps(said.objects, box).min() > _MATCHED_WITHIN:
+        if not len(said.objects.ids) or _gaps(said.objects, box).min() > MATCHED_WITHIN:
             text = f"object {name} missing; truth: {_seen(occasion, row)}"
             found.append(Difference("objects", text, math.inf))
             continue

@@ -157,7 +157,7 @@ def _probe(number: int, question: Question, jitter: int | None, answer: Glimpse 
     if isinstance(answer, Failure):
         reason = "; ".join([answer.reason, *answer.said.splitlines()[-_QUOTED_LINES:]])
         return Probe(number, question, jitter, Outcome.UNRESOLVED, None, reason, 0.0, 0.0, None, b"", 0, 0, None)
-    outcome, reason = _outcome(answer, setting)
+    outcome, reason = outcome_of(answer, setting)
     return Probe(
         id=number,
         question=question,
@@ -175,7 +175,8 @@ def _probe(number: int, question: Question, jitter: int | None, answer: Glimpse 
     )
 
 
-def _outcome(answer: Glimpse, setting: Setting) -> tuple[Outcome, str]:
+def outcome_of(answer: Glimpse, setting: Setting) -> tuple[Outcome, str]:
+    """What a counterfactual run says, and why it says nothing when it is UNRESOLVED."""
     if answer.violations:
         return Outcome.VIOLATES, ""
     blind = [one for one in answer.judgements if one.answer is Answer.UNKNOWN and one.kind not in _MISSION]

@@ -34,4 +34,4 @@ def run_benchmark(
 
 
 def _key(case: Case, setting: Setting) -> str:
-    return key_of([case, setting.seed, setting.repeats, setting.has_controls, versions()])
+    return key_of([case, setting.seed, setting.repeats, setting.has_controls, setting.baselines, versions()])

@@ -8,10 +8,14 @@ import msgspec
 
 from dvca_sumo import api
 from dvca_sumo.analysis.attribution import Attribution
+from dvca_sumo.analysis.violating import principal
+from dvca_sumo.bench.baselines import BASELINES
+from dvca_sumo.bench.baselines.procedure import Situation
+from dvca_sumo.bench.baselines.scoring import baseline_scores, no_violation
 from dvca_sumo.bench.cases import Case
 from dvca_sumo.bench.ground_truth import altered_messages
 from dvca_sumo.bench.proof import is_proven
-from dvca_sumo.bench.score import Controls, Mode, Score, failed, scored
+from dvca_sumo.bench.score import BaselineScore, Controls, Mode, Score, failed, scored
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.record import Record
 from dvca_sumo.violations import Answer
@@ -27,6 +31,7 @@ class Setting(msgspec.Struct, frozen=True):
     seed: int | None = None  # of the scenario; None: its own
     repeats: int | None = None  # None: exact mode; else jitter mode with so many runs of each question
     has_controls: bool = True
+    baselines: tuple[str, ...] = ()  # names of those that are to explain each case as well
     attribute: Attribute = api.attribute
 
     @property
@@ -69,16 +74,33 @@ def judged(
 ) -> Score:
     """The score of an answer about `drive`; `walls` [s] are what the factual run and the answer took."""
     is_exact = setting.repeats is None
+    altered = altered_messages(case, drive.request.scenario, drive.record, None if is_exact else 0)
     return scored(
         case,
         found,
-        altered_messages(case, drive.request.scenario, drive.record, None if is_exact else 0),
+        altered,
         mode=setting.mode,
         seed=drive.request.scenario.seed,
         walls=walls,
         is_proven=is_proven(drive, found) if is_exact else None,
         controls=_controls(case, setting, drive.record) if setting.has_controls else None,
+        baselines=_baselines(case, setting, altered) if setting.baselines else {},
     )
+
+
+def _baselines(case: Case, setting: Setting, altered: tuple[int, ...]) -> dict[str, BaselineScore]:
+    """On a drive of their own: they must not find what the analysis has left behind."""
+    asked = [BASELINES[name] for name in setting.baselines]
+    healthy = _driven(case, setting, "", "")
+    healthy.engine.close()
+    drive = _driven(case, setting, case.fault, case.bug)
+    try:
+        if not drive.record.violations:
+            return no_violation(asked)
+        situation = Situation(drive, principal(drive.record.violations), healthy.record, case.component)
+        return baseline_scores(asked, situation, altered)
+    finally:
+        drive.engine.close()
 
 
 def _driven(case: Case, setting: Setting, fault: str, bug: str, scenario: str = "") -> api.FactualDrive:

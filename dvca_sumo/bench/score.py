@@ -7,7 +7,7 @@ import msgspec
 from dvca_sumo.analysis.attribution import Attribution
 from dvca_sumo.bench.cases import Case
 from dvca_sumo.messages import MessageId
-from dvca_sumo.record import Record
+from dvca_sumo.record import MessageMark, Record
 
 Mode = Literal["exact", "jitter"]
 
@@ -25,6 +25,19 @@ class Controls(msgspec.Struct, frozen=True):
     def hold(self) -> bool:
         """Whether all three came out as they must."""
         return self.without is True and self.defective is True and self.harmless is True
+
+
+class BaselineScore(msgspec.Struct, frozen=True):
+    """What a baseline made of one case."""
+
+    component: str | None  # None: none was named
+    component_success: bool | None  # None: it was told which one it is
+    message_success: bool | None  # None: it names components only
+    message_distance_s: float | None  # as in `Score`
+    probes: int
+    simulated_s: float
+    wall_s: float
+    reason: str
 
 
 class Score(msgspec.Struct, frozen=True):
@@ -52,6 +65,7 @@ class Score(msgspec.Struct, frozen=True):
     is_proven: bool | None  # by runs of their own, of the definition of the reported message; None: not asked
     controls: Controls | None  # None: not run
     command: str  # that shows this case alone
+    baselines: dict[str, BaselineScore] = {}  # by name; empty: not asked for
 
 
 def scored(
@@ -64,6 +78,7 @@ def scored(
     walls: tuple[float, float],
     is_proven: bool | None,
     controls: Controls | None,
+    baselines: dict[str, BaselineScore],
 ) -> Score:
     """Hold an attribution against the messages that the defect `altered`.
 
@@ -76,6 +91,7 @@ def scored(
         walls: [s] of the factual run, of the attribution.
         is_proven: See `Score`.
         controls: What the control runs said.
+        baselines: What others made of it.
     """
     record, component = found.record, case.component
     named = None if found.components is None else found.components.component
@@ -92,7 +108,7 @@ def scored(
         component=None if named is None else named.value,
         component_success=is_right,
         message_success=is_message_right,
-        message_distance_s=_distance(found, altered, case) if is_right else None,
+        message_distance_s=distance(record, found.message, altered) if is_right else None,
         altered_share=len(altered) / counts[component] if counts[component] else 0.0,
         reduction_rate=1.0 - 1.0 / sum(counts.values()) if is_message_right else 0.0,
         component_reduction_rate=1.0 - 1.0 / counts[component] if is_message_right else 0.0,
@@ -105,6 +121,7 @@ def scored(
         is_proven=is_proven,
         controls=controls,
         command=case.command(seed, has_jitter=mode == "jitter"),
+        baselines=baselines,
     )
 
 
@@ -136,11 +153,9 @@ def failed(case: Case, mode: Mode, seed: int, reason: str) -> Score:
     )
 
 
-def _distance(found: Attribution, altered: tuple[int, ...], case: Case) -> float | None:
-    if found.message is None or not altered:
+def distance(record: Record, message: MessageMark | None, altered: tuple[int, ...]) -> float | None:
+    """[s] from a message to the nearest one of the same component that is `altered`; None without either."""
+    if message is None or not altered:
         return None
-    return min(abs(_time(found.record, case, index) - found.message.time) for index in altered)
-
-
-def _time(record: Record, case: Case, index: int) -> float:
-    return record.mark(MessageId(case.component, index)).time
+    times = (record.mark(MessageId(message.component, index)).time for index in altered)
+    return min(abs(time - message.time) for time in times)

@@ -1,35 +1,20 @@
 """What a row of scores comes to, and whether that is good enough."""
 
-import math
 import statistics
 from collections import Counter
 from collections.abc import Sequence
 
 import msgspec
 
+from dvca_sumo.bench.procedures import ProcedureSummary, procedures_of
 from dvca_sumo.bench.score import FAILED, Score
-
-_Z = 1.959964  # of the standard normal distribution, for 95 %
+from dvca_sumo.bench.share import Share, share_of
 
 # What has to hold for an analysis to be trusted; shares of cases.
 _COMPONENTS, _MESSAGES = 1.0, 1.0  # of the written suites in exact mode
 _JITTER_MESSAGES = 0.98
 _RANDOM_COMPONENTS, _RANDOM_MESSAGES = 0.98, 0.97
 _REDUCTION = 0.995
-
-
-class Share(msgspec.Struct, frozen=True):
-    """`count` of `total`, with Wilson's 95 % interval (E. B. Wilson, 1927)."""
-
-    count: int
-    total: int
-    low: float
-    high: float
-
-    @property
-    def value(self) -> float:
-        """From 0 to 1; 0 of nothing is 0."""
-        return self.count / self.total if self.total else 0.0
 
 
 class Check(msgspec.Struct, frozen=True):
@@ -58,16 +43,7 @@ class Summary(msgspec.Struct, frozen=True):
     worst_wall_s: float
     confusion: dict[str, dict[str, int]]  # expected component -> reported one, or "none" -> cases
     checks: tuple[Check, ...]
-
-
-def share_of(count: int, total: int) -> Share:
-    """A share with its interval; of nothing it is unknown: from 0 to 1."""
-    if total == 0:
-        return Share(count, total, 0.0, 1.0)
-    rate, square = count / total, _Z * _Z
-    middle = (rate + square / (2 * total)) / (1 + square / total)
-    reach = _Z * math.sqrt(rate * (1 - rate) / total + square / (4 * total * total)) / (1 + square / total)
-    return Share(count, total, max(middle - reach, 0.0), min(middle + reach, 1.0))
+    procedures: tuple[ProcedureSummary, ...]  # ours and the baselines; empty: not asked for
 
 
 def summary_of(scores: Sequence[Score]) -> Summary:
@@ -107,6 +83,7 @@ def summary_of(scores: Sequence[Score]) -> Summary:
             {"reported messages are proven": proofs, "controls hold": controls},
             reduction,
         ),
+        procedures=procedures_of(scores),
     )
 
 

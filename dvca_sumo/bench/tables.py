@@ -5,8 +5,10 @@ from collections.abc import Callable, Sequence
 import msgspec
 
 from dvca_sumo.bench.paper import BY_SUITE, Figures
+from dvca_sumo.bench.procedures import ProcedureSummary
 from dvca_sumo.bench.score import FAILED, Score
-from dvca_sumo.bench.summary import Share, Summary, summary_of
+from dvca_sumo.bench.share import Share
+from dvca_sumo.bench.summary import Summary, summary_of
 from dvca_sumo.messages import COMPONENTS
 from dvca_sumo.report.result import Json, versions
 
@@ -52,6 +54,7 @@ def _document(scores: Sequence[Score], render: _Render) -> str:
         parts += [
             render(title, _by_component(summary, group)),
             render("Cost of one attribution", _costs(summary)),
+            *([render("What each idea buys", _procedures(summary))] if summary.procedures else []),
             render("Component: planted (rows), named (columns)", _confusion(summary)),
             *(["Wrong, and how to see it:\n" + _wrong(group)] if _wrong(group) else []),
             "Checks:\n" + "\n".join(f"- {'holds' if one.holds else 'FAILS'}: {one.text}" for one in summary.checks),
@@ -97,6 +100,23 @@ def _costs(summary: Summary) -> Rows:
         minutes = sorted(minute for figures in BY_SUITE[summary.suite].values() for minute in figures.minutes)
         rows.append(["paper", f"{minutes[0]:g} to {minutes[-1]:g} min on average", "", ""])
     return rows
+
+
+def _procedures(summary: Summary) -> Rows:
+    head = ["procedure", "component right", "message right", "probes", "simulated", "median", "worst"]
+    return [head, *map(_procedure, summary.procedures)]
+
+
+def _procedure(one: ProcedureSummary) -> list[str]:
+    return [
+        one.title,
+        "is told" if one.components is None else _share(one.components, has_interval=False),
+        "names none" if one.messages is None else _share(one.messages, has_interval=False),
+        f"{one.probes:.1f}",
+        f"{one.simulated_s:.0f} s",
+        f"{one.median_wall_s:.1f} s",
+        f"{one.worst_wall_s:.1f} s",
+    ]
 
 
 def _confusion(summary: Summary) -> Rows:

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from dvca_sumo.api import CPUS
+from dvca_sumo.bench.baselines import BASELINES, available_baselines
 from dvca_sumo.bench.benchmark import run_benchmark
 from dvca_sumo.bench.cases import WRITTEN
 from dvca_sumo.bench.runs import Setting
@@ -37,6 +38,7 @@ class _Countdown:
 @click.option("--suite", type=click.Choice([*WRITTEN, "all"]), default="all", show_default=True, help="Which cases.")
 @click.option("--jitter", is_flag=True, help="In jitter mode as well, the paper's setting.")
 @click.option("--repeats", type=click.IntRange(1), help=f"Runs of each question in jitter mode [default: {REPEATS}]")
+@click.option("--baselines", is_flag=True, help="Beside ours: observation, whole runs, the paper's procedure, ddmin.")
 @click.option("--jobs", type=click.IntRange(1), default=CPUS, show_default=True, help="Cases at once.")
 @click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Results; to go on from there.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
@@ -44,6 +46,7 @@ def bench(
     suite: str,
     jitter: bool,  # noqa: FBT001
     repeats: int | None,
+    baselines: bool,  # noqa: FBT001
     jobs: int,
     output: Path | None,
     as_json: bool,  # noqa: FBT001
@@ -60,7 +63,8 @@ def bench(
     if output is not None:
         make_folder(output)
     cases = [case for name, cases_of in WRITTEN.items() if suite in (name, "all") for case in cases_of()]
-    settings = [Setting(), *([Setting(repeats=repeats or REPEATS)] if jitter else [])]
+    beside = _beside() if baselines else ()
+    settings = [Setting(repeats=count, baselines=beside) for count in (None, *([repeats or REPEATS] if jitter else []))]
     store = None if output is None else Store(output / "scores.jsonl")
     scores = run_benchmark(cases, settings, jobs, store, _Countdown().score)
     result = json.dumps(json_of(scores), indent=1)
@@ -69,3 +73,12 @@ def bench(
         write_whole(output / "benchmark.json", result + "\n")
     click.echo(result if as_json else terminal_text(scores))
     sys.exit(0 if all(check.holds for one in summaries(scores) for check in one.checks) else 1)
+
+
+def _beside() -> tuple[str, ...]:
+    """Names of the baselines that can be run; tells of the others."""
+    names = tuple(one.name for one in available_baselines())
+    for name, baseline in BASELINES.items():
+        if name not in names:
+            tell(f"{baseline.title} is left out: picire is not installed (pip install 'dvca-sumo[test]')")
+    return names

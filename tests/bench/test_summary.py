@@ -5,7 +5,8 @@ from msgspec.structs import replace
 
 from bench.scores import HOLDING, score
 from dvca_sumo.bench.score import FAILED, Controls, Score
-from dvca_sumo.bench.summary import share_of, summary_of
+from dvca_sumo.bench.share import share_of
+from dvca_sumo.bench.summary import summary_of
 
 
 @pytest.mark.parametrize(
