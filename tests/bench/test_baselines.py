@@ -121,6 +121,20 @@ def test_observation_sees_an_object_that_is_not_there() -> None:
     assert found.component is PERCEPTION
 
 
+def test_messages_that_were_not_published_shift_no_other() -> None:
+    silent = saying(drive([WALKER], violations=[HIT]), MessageId(PERCEPTION, 0), None)
+    blind = saying(silent, MessageId(PERCEPTION, 20), tracked([], START + 2.0))
+    found = most_deviating(situation(blind)[0])
+    assert found.message is not None
+    assert found.message.index == 20
+
+
+def test_observation_misses_an_object_far_from_where_it_is_said_to_be() -> None:
+    right = drive([WALKER], violations=[HIT])
+    far = saying(right, MessageId(PERCEPTION, 20), tracked([replace(WALKER, x=WALKER.x + 16.0)], START + 2.0))
+    assert most_deviating(situation(far, healthy=right)[0]).component is PERCEPTION
+
+
 # Whole-run substitution
 
 

@@ -27,7 +27,7 @@ from dvca_sumo.messages import (
 from dvca_sumo.record import Record
 from dvca_sumo.stack.ideal import SUBSTITUTES
 
-# A deviation is three sizes [m] or comparable; an angle counts as what it moves in so many metres.
+# A deviation is a row of sizes: [m] or comparable, or a number of objects; an angle counts as what it moves so far off.
 _HEADING_LEVER = 10.0  # [m]
 _STEERING_LEVER = 20.0  # [m]
 _LEAST_SPREAD = 0.05  # a component that is exact in the healthy drive must not be blamed for a hair
@@ -38,8 +38,8 @@ def most_deviating(situation: Situation) -> Reply:
     """The component of the message with the largest z-score, and that message.
 
     The z-score of a message is the largest of its sizes, each less the mean of the healthy drive, over the
-    standard deviation there. Planning has no ideal: it is named when no component's largest z-score is
-    beyond its largest one of the healthy drive.
+    standard deviation there; sizes that the healthy drive has as well do not count. Planning has no ideal:
+    it is named when nothing counts.
     """
     record = situation.drive.record
     tops: dict[Component, tuple[float, int]] = {}
@@ -49,9 +49,9 @@ def most_deviating(situation: Situation) -> Reply:
         if not len(usual) or not len(here):
             continue
         mean, spread = usual.mean(axis=0), np.maximum(usual.std(axis=0), _LEAST_SPREAD)
-        scores = ((here - mean) / spread).max(axis=1)
+        scores = np.where(here > usual.max(axis=0), (here - mean) / spread, -np.inf).max(axis=1)
         index = int(np.argmax(scores))
-        if scores[index] > ((usual - mean) / spread).max():
+        if scores[index] > -np.inf:
             tops[component] = (float(scores[index]), index)
     if not tops:
         return Reply(Component.PLANNING, None, "no other component deviates more than in the healthy drive")
@@ -62,18 +62,21 @@ def most_deviating(situation: Situation) -> Reply:
 
 
 def deviations(record: Record, component: Component) -> Floats:
-    """(messages, 3) how far each message is from the ideal one; a message that was not published repeats the last."""
+    """(messages, sizes) how far each message is from the ideal one; one that was not published repeats the last."""
     futures = recorded_futures(record.moments)
-    rows = np.zeros((len(record.executions[component]), 3))
-    for index, execution in enumerate(record.executions[component]):
-        if execution.message is not None:
-            rows[index] = _deviation(record, MessageId(component, index), execution.message, futures)
-        elif index > 0:
-            rows[index] = rows[index - 1]
-    return rows
+    made = record.executions[component]
+    known = {
+        index: _deviation(record, MessageId(component, index), execution.message, futures)
+        for index, execution in enumerate(made)
+        if execution.message is not None
+    }
+    if not known:
+        return np.empty((0, 1))
+    latest = known[min(known)]
+    return np.array([latest := known.get(index, latest) for index in range(len(made))])
 
 
-def _deviation(record: Record, message: MessageId, said: Message, futures: Futures) -> tuple[float, float, float]:
+def _deviation(record: Record, message: MessageId, said: Message, futures: Futures) -> tuple[float, ...]:
     ideal = SUBSTITUTES[message.component](occasion_of(record, message, futures))
     if isinstance(said, LocalizationEstimate) and isinstance(ideal, LocalizationEstimate):
         turn = _HEADING_LEVER * abs(wrapped(said.heading - ideal.heading))
@@ -81,38 +84,36 @@ def _deviation(record: Record, message: MessageId, said: Message, futures: Futur
     if isinstance(said, TrackedObjects) and isinstance(ideal, TrackedObjects):
         return _of_objects(said, ideal)
     if isinstance(said, PredictedObjects) and isinstance(ideal, PredictedObjects):
-        return _of_futures(said, ideal), 0.0, 0.0
+        return _of_futures(said, ideal)
     assert isinstance(said, ControlCommand)  # planning, the only other one, has no ideal
     assert isinstance(ideal, ControlCommand)
     turn = _STEERING_LEVER * abs(said.steering - ideal.steering)
-    return abs(said.acceleration - ideal.acceleration), turn, 0.0
+    return abs(said.acceleration - ideal.acceleration), turn
 
 
-def _of_objects(said: TrackedObjects, ideal: TrackedObjects) -> tuple[float, float, float]:
-    """Largest error of place, size and speed; an object that is missing, or is none, is off by `MATCHED_WITHIN`."""
+def _of_objects(said: TrackedObjects, ideal: TrackedObjects) -> tuple[float, ...]:
+    """Largest error of place, size and velocity; how many objects are missing, how many are none."""
     rows, gaps = _matched(said, ideal)
     found = rows >= 0
-    others = len(said.ids) - len(set(rows[found].tolist()))
-    place = max([*gaps[found], *([MATCHED_WITHIN] if others > 0 or not found.all() else [])], default=0.0)
+    place = gaps[found].max(initial=0.0)
     sizes = np.abs(said.boxes[rows[found], 3:] - ideal.boxes[found, 3:])
     speeds = np.hypot(*(said.velocities[rows[found]] - ideal.velocities[found]).T)
-    return float(place), float(sizes.max(initial=0.0)), float(speeds.max(initial=0.0))
+    missing, others = int(np.sum(~found)), len(said.ids) - len(np.unique(rows[found]))
+    return float(place), float(sizes.max(initial=0.0)), float(speeds.max(initial=0.0)), missing, others
 
 
-def _of_futures(said: PredictedObjects, ideal: PredictedObjects) -> float:
-    """Largest error of place, 3 s later; an object without a future is taken to stay."""
+def _of_futures(said: PredictedObjects, ideal: PredictedObjects) -> tuple[float, ...]:
+    """Largest error of place, 3 s later, where an object without a future is taken to stay; how many are missing."""
     rows, _ = _matched(said.objects, ideal.objects)
     worst = 0.0
-    for which, row in enumerate(rows):
-        if row < 0:
-            worst = max(worst, MATCHED_WITHIN)
-            continue
+    for which in np.flatnonzero(rows >= 0):
+        row = rows[which]
         own = np.flatnonzero(said.owners == row)
         place = said.objects.boxes[row, :2]
         if own.size:
             place = said.poses[own[int(np.argmax(said.probabilities[own]))], _AHEAD, :2]
         worst = max(worst, float(np.hypot(*(place - ideal.poses[which, _AHEAD, :2]))))
-    return worst
+    return worst, int(np.sum(rows < 0))
 
 
 def _matched(said: TrackedObjects, ideal: TrackedObjects) -> tuple[Integers, Floats]:
