@@ -7,6 +7,7 @@ from command_line import Said, assert_one_error
 
 from dvca_sumo.cli import ExitCode
 from dvca_sumo.interventions import fault_library
+from dvca_sumo.stack.bugs import BUGS
 
 Called = Callable[..., Said]
 
@@ -44,6 +45,8 @@ BAD_USAGE = {
     f"run {CS1} --begin soon": "'--begin': 'soon'",
     f"run {CS1} --jitter --repeats 0": "'--repeats': 0 is not in the range",
     f"run {CS1} --repeats 2": "--repeats goes with --jitter",
+    f"run {CS1} --bug": "'--bug' requires an argument",
+    f"run {CS1} --bug apollo-6826 --stack mine:stack": "does not go with --stack MODULE:FACTORY",
     f"run {CS1} -o {__file__}": "is a file",
     "faults more": "unexpected extra argument (more)",
 }
@@ -57,6 +60,11 @@ def test_a_wrong_fault_is_bad_input(called: Called, fault: str) -> None:
 def test_a_wrong_fault_behind_a_right_one_is_bad_input(called: Called) -> None:
     said = called("run", CS1, "--fault", "planning.none", "--fault", "control.lateral:error=2")
     assert_one_error(said, ExitCode.BAD_INPUT, "control.lateral: parameter error is out of range: 2")
+
+
+def test_an_unknown_bug_is_bad_input(called: Called) -> None:
+    said = called("run", CS1, "--bug", "apollo-6286")
+    assert_one_error(said, ExitCode.BAD_INPUT, "no bug 'apollo-6286'", *BUGS, "did you mean 'apollo-6826'?")
 
 
 @pytest.mark.parametrize("line", BAD_USAGE)
@@ -79,8 +87,8 @@ def test_no_words_at_all_show_the_help(called: Called) -> None:
         (
             "run --help",
             (
-                *("SUMOCFG", "--fault", "--ego", "--seed", "--stack", "--engine", "--jobs", "--jitter", "--repeats"),
-                *("--begin", "--end", "-o", "--json"),
+                *("SUMOCFG", "--fault", "--bug", "--ego", "--seed", "--stack", "--engine", "--jobs", "--jitter"),
+                *("--repeats", "--begin", "--end", "-o", "--json"),
                 *("0 no violation", "1 violation", "2 usage", "3 bad input", "4 violation", "70", "130"),
             ),
         ),
@@ -101,7 +109,8 @@ def test_faults_lists_all_thirteen_with_component_parameters_and_units(called: C
     library = fault_library()
     assert len(library) == 13
     sections = {lines[0]: lines[1:] for lines in _sections(said.out)}
-    assert list(sections) == [f"{name}  ({fault.component.value})" for name, fault in library.items()] + ["every fault"]
+    headings = [f"{name}  ({fault.component.value})" for name, fault in library.items()] + ["every fault"]
+    assert list(sections)[: len(headings)] == headings
     for fault, lines in zip(library.values(), sections.values(), strict=False):
         assert lines[0] == fault.summary
         for (key, parameter), line in zip(fault.parameters.items(), lines[1:], strict=True):
@@ -111,6 +120,12 @@ def test_faults_lists_all_thirteen_with_component_parameters_and_units(called: C
             assert f"default {parameter.default}" in line
     common = "\n".join(sections["every fault"])
     assert [word for word in ("start", "end", "first", "last", "state", "[s", "[message]") if word not in common] == []
+
+
+def test_faults_lists_the_real_bugs_with_component_and_source(called: Called) -> None:
+    sections = {lines[0]: lines[1:] for lines in _sections(called("faults").out)}
+    bugs = {f"{name}  ({bug.component.value})": [bug.summary, bug.source] for name, bug in BUGS.items()}
+    assert {heading: sections[heading] for heading in list(sections)[-len(bugs) :]} == bugs
 
 
 def _sections(text: str) -> list[list[str]]:

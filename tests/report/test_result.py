@@ -73,6 +73,13 @@ def perception_missed(answers: Answers | None = None, **more: Any) -> dict[str, 
     return told(attributed(record, given, faults=(FAULTY,), **more), (FAULTY,))
 
 
+@pytest.mark.parametrize("bug", [None, "apollo-6826"])
+def test_the_bug_of_the_build_is_told(bug: str | None) -> None:
+    result = result_of(SCENARIO, (), attributed(drive(), lambda _: SAFE), TIMING, bug)
+    VALIDATOR(SCHEMA).validate(result)
+    assert result["bug"] == bug
+
+
 def test_the_schema_is_a_schema_of_2020_12_and_ships_with_the_package() -> None:
     assert SCHEMA["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     VALIDATOR.check_schema(SCHEMA)

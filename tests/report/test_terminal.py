@@ -83,6 +83,19 @@ def test_a_harmless_fault_is_mentioned() -> None:
     assert "3 messages altered" in said
 
 
+def test_the_bug_of_the_build_is_held_against_the_answer() -> None:
+    assert line(verdict_text(explained(), TIMING, "apollo-3634"), "BUG").endswith(
+        "apollo-3634 (perception): component found"
+    )
+    assert line(verdict_text(explained(), TIMING, "apollo-6826"), "BUG").endswith("(planning): component NOT found")
+    assert "BUG" not in text(explained())
+
+
+def test_a_harmless_bug_is_mentioned() -> None:
+    said = verdict_text(attributed(drive(), lambda _: SAFE), TIMING, "apollo-6826")
+    assert line(said, "bug").split() == ["bug", "apollo-6826", "(planning),", "to", "no", "violation"]
+
+
 def test_what_happened_tells_kind_time_place_and_with_whom() -> None:
     said = text(explained())
     assert line(said, "VIOLATION").split() == ["VIOLATION", "collision", "with", "person:ped", "at", "9.4", "s"]

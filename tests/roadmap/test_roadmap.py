@@ -55,6 +55,27 @@ def test_higher_lane_lies_to_the_right_in_a_left_hand_net(grid: NetBuilder) -> N
     assert (offsets < 0.0).all()
 
 
+@pytest.mark.parametrize(("kind", "is_motorway"), [("highway.primary", False), ("highway.motorway", True)])
+def test_a_gap_in_the_ego_s_map_hides_a_limit_that_holds_nevertheless(
+    plain: NetBuilder,
+    kind: str,
+    is_motorway: bool,  # noqa: FBT001
+) -> None:
+    gap = '<param key="dvca.map.speed_limit" value="missing"/>'
+    nodes = TWO_NODES + '<node id="c" x="350" y="0"/>'
+    edges = (
+        f'<edge id="ab" from="a" to="b" speed="20" type="{kind}">{gap}</edge><edge id="bc" from="b" to="c" speed="20"/>'
+    )
+    roadmap = plain(nodes, edges)
+    assert [roadmap.lanes[lane].is_limit_mapped for lane in ("ab_0", "bc_0")] == [False, True]
+    route = roadmap.route(["ab", "bc"], "ab_0", 20.0, None, 100.0)
+    assert set(route.speed_limits.tolist()) == {20.0}
+    (unmapped,) = route.unmapped_limits
+    assert unmapped.is_motorway is is_motorway
+    hidden = (route.line.stations >= unmapped.start_station) & (route.line.stations <= unmapped.end_station)
+    assert [lane == "ab_0" for lane in route.lane_ids] == hidden.tolist()
+
+
 def test_bus_lane_is_no_neighbour_of_a_car(plain: NetBuilder) -> None:
     lanes = plain(TWO_NODES, BUS_LANE).lanes
     assert not lanes["e_0"].is_drivable
