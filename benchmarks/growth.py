@@ -14,12 +14,11 @@ at the end. Wall times are the best of `--repeat` rounds, `flat` is attribution 
 """
 
 import argparse
-import bisect
 import math
 import random
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -54,6 +53,8 @@ class Trip(msgspec.Struct, frozen=True):
 
     edges: tuple[str, ...]
     departure: float  # [s]
+    position: float = 0.0  # [m] of the front bumper on the first edge
+    speed: float = 0.0  # [m/s]
 
 
 class Row(msgspec.Struct, frozen=True):
@@ -110,12 +111,7 @@ def _trips(city: Scenario, folder: Path, departure: float, scale: float) -> tupl
         raise SystemExit(f"no way among {_WAYS} on which the ego drives for {longest:g} s without a violation")
     time_met, cone = record.path[met].time, (record.path[met].x, record.path[met].y)
     print(f"way {seed}: the cone is met at {time_met:.1f} s, {record.stations[met] / 1000.0:.1f} km on")
-    entries = list(_entries(record, whole.edges))
-    trips = []
-    for length in TRIPS:
-        row, entered = min(entries, key=lambda entry: abs(entry[1] - time_met + length))
-        trips.append(Trip(whole.edges[row:], entered))
-    return trips, cone
+    return [_begun(record, whole.edges, time_met - length) for length in TRIPS], cone
 
 
 def _way(net: Path, duration: float, seed: int) -> tuple[str, ...]:
@@ -160,18 +156,20 @@ def _meeting(record: Record) -> int | None:
     return None
 
 
-def _entries(record: Record, edges: Sequence[str]) -> Iterator[tuple[int, float]]:
-    """Rows of `edges` with the time at which the ego entered each."""
-    yield 0, record.start
-    row, before = 0, edges[0]
+def _begun(record: Record, edges: Sequence[str], time: float) -> Trip:
+    """The rest of the drive from `time` [s] on."""
+    if time <= record.start:
+        return Trip(tuple(edges), record.start - 0.1)
+    row, entered = 0, record.route.start
+    tick = round((time - record.start) / TICK)
+    front = record.stations[tick] + record.moments[0].shape.front
     for station, lane in zip(record.route.line.stations, record.route.lane_ids, strict=True):
+        if station > front:
+            break
         edge = lane.rpartition("_")[0]
-        if edge == before or edge.startswith(":") or row + 1 == len(edges) or edge != edges[row + 1]:
-            continue
-        row, before = row + 1, edge
-        tick = bisect.bisect_left(record.stations, float(station))
-        if tick < len(record.path):
-            yield row, round(record.path[tick].time, 1)
+        if row + 1 < len(edges) and edge == edges[row + 1] != edges[row]:
+            row, entered = row + 1, float(station)
+    return Trip(tuple(edges[row:]), round(record.path[tick].time, 1), front - entered, record.path[tick].speed)
 
 
 def _scenario(
@@ -186,7 +184,8 @@ def _scenario(
     files, ego, extra, config = city.configuration, *(folder / name for name in ("e.rou.xml", "c.add.xml", "r.sumocfg"))
     ego.write_text(
         f'<routes><vType id="{EGO}" scale="{1.0 / scale}"/>'  # there is one ego, however much traffic
-        f'<vehicle id="{EGO}" type="{EGO}" depart="{trip.departure}" departLane="best" departSpeed="0">'
+        f'<vehicle id="{EGO}" type="{EGO}" depart="{trip.departure}" departLane="best"'
+        f' departPos="{trip.position}" departSpeed="{trip.speed}">'
         f'<param key="dvca.lane_tolerance" value="{_LANE_TOLERANCE}"/>'
         f'<route edges="{" ".join(trip.edges)}"/></vehicle></routes>'
     )
