@@ -29,6 +29,7 @@ from dvca_sumo.record import Record
 from dvca_sumo.run import Task, rtest
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.stack.reference import reference_stack
+from dvca_sumo.stack.sources import StackSource
 
 BUILT_IN = ["nets/cs3.sumocfg"]
 MOST_SLOWER = 0.1
@@ -87,7 +88,7 @@ def _without(scenario: Scenario, task: Task) -> Drive:
 
 
 def _with(scenario: Scenario, task: Task) -> Drive:
-    with contextlib.closing(ForkEngine(scenario.configuration.net, None, 1, 3600.0)) as engine:
+    with contextlib.closing(ForkEngine(scenario.configuration.net, StackSource(), 1, 3600.0)) as engine:
         begin = time.perf_counter()
         record = engine.record(task)
         wall = time.perf_counter() - begin
