@@ -28,7 +28,7 @@ from dvca_sumo.engine.descriptors import make_own
 from dvca_sumo.engine.forking import Child, Lineage, NotForkedError
 from dvca_sumo.engine.orders import Delivered, Died, Driven, Order, Parked, Recall
 from dvca_sumo.engine.passes import Pass, predicts_ideally, settled, summary
-from dvca_sumo.engine.processes import Failure, adopt_orphans, death, print_to_descriptors, raised_here
+from dvca_sumo.engine.processes import Failure, adopt_orphans, calculate_alone, death, print_to_descriptors, raised_here
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.engine.thinning import Kept
 from dvca_sumo.record import Record
@@ -74,6 +74,7 @@ class Holder:
         adopt_orphans()
         make_own(self._log)
         print_to_descriptors()
+        calculate_alone()
         tempfile.tempdir = str(self._folder)  # the run's own folder goes with it, however this process ends
         try:
             with departed(task, roadmap_of, factory) as self._simulation:

@@ -23,10 +23,12 @@ from dvca_sumo.engine.branches import Branches, Plan
 from dvca_sumo.engine.branching import Holder
 from dvca_sumo.engine.grove import Grove
 from dvca_sumo.engine.orders import Driven
+from dvca_sumo.engine.passes import is_ideal_prediction
 from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.engine.replay import DEFAULT_TIMEOUT, ReplayEngine, raised, roadmap
 from dvca_sumo.interventions import Fault, Ideal
+from dvca_sumo.messages import PREDICTION_TIMES
 from dvca_sumo.record import TICK, Record
 from dvca_sumo.run import Task
 from dvca_sumo.stack.sources import StackSource, stack_factory
@@ -166,8 +168,14 @@ class ForkEngine:
                 if step - nearest >= _WORTH_A_CHECKPOINT and known.isdisjoint(range(step, step + _WORTH_A_CHECKPOINT))
             )
             known.update(new)
-            plans.append(Plan(task, usable, new))
+            plans.append(Plan(self._with_needed_futures(task), usable, new))
         return plans
+
+    def _with_needed_futures(self, task: Task) -> Task:
+        """The same run, with no more recorded motion than it asks for: an order is sent, the longer the costlier."""
+        starts = [one.selection.start for one in task.interventions if is_ideal_prediction(one)]
+        begin, end = self._departed + min(starts, default=math.inf) - 1.0, task.stop.at + PREDICTION_TIMES[-1] + 1.0
+        return msgspec.structs.replace(task, futures=task.futures.between(begin, end))
 
     def _latest_step(self, task: Task) -> int:
         """World step up to which a run of `task` is the factual run: nothing is substituted, and it goes on."""

@@ -4,6 +4,7 @@ SUMO's drivers react to the ego, so their futures depend on the branch. A run wi
 repeated with the futures that its own previous pass recorded, until they agree.
 """
 
+import bisect
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -12,7 +13,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.engine.protocol import Glimpse
-from dvca_sumo.interventions import Futures, Ideal, recorded_futures
+from dvca_sumo.interventions import Futures, Ideal, Intervention, recorded_futures
 from dvca_sumo.messages import Component
 from dvca_sumo.record import Record
 from dvca_sumo.run import Task
@@ -33,7 +34,12 @@ class Pass(msgspec.Struct, frozen=True):
 
 def predicts_ideally(task: Task) -> bool:
     """Whether a task substitutes prediction."""
-    return any(isinstance(one, Ideal) and one.component is Component.PREDICTION for one in task.interventions)
+    return any(map(is_ideal_prediction, task.interventions))
+
+
+def is_ideal_prediction(intervention: Intervention) -> bool:
+    """Whether it is one that asks for recorded futures."""
+    return isinstance(intervention, Ideal) and intervention.component is Component.PREDICTION
 
 
 def summary(task: Task, record: Record, simulated: float, wall: float) -> Pass:
@@ -41,7 +47,8 @@ def summary(task: Task, record: Record, simulated: float, wall: float) -> Pass:
     residual, futures = None, Futures()
     if predicts_ideally(task):
         since = record.start if record.substituted is None else record.substituted
-        moments = [moment for moment in record.moments if moment.time >= since]
+        # Found without touching the others: a forked process makes a copy of all that it touches.
+        moments = record.moments[bisect.bisect_left(record.moments, since, key=lambda moment: moment.time) :]
         residual, futures = divergence(task.futures, moments), recorded_futures(moments)
     glimpse = Glimpse(
         violations=tuple(record.violations),

@@ -5,8 +5,10 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from dvca_sumo.messages import PREDICTION_TIMES, Floats
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers
 from dvca_sumo.truth import Moment
+
+_EARLY = 0.05  # [s] before its record an object counts as there already
 
 
 class Track(msgspec.Struct, frozen=True):
@@ -29,7 +31,7 @@ class Futures(msgspec.Struct, frozen=True):
         hold the object at `time`.
         """
         track = self.tracks.get(name)
-        if track is None or not track.times[0] - 0.05 <= time <= track.times[-1]:
+        if track is None or not track.times[0] - _EARLY <= time <= track.times[-1]:
             return None
         wanted = time + PREDICTION_TIMES
         poses = np.column_stack([np.interp(wanted, track.times, track.poses[:, column]) for column in range(3)])
@@ -40,21 +42,34 @@ class Futures(msgspec.Struct, frozen=True):
         lanes = dict.fromkeys(lane for lane in track.lanes[start : end + 1] if lane)
         return poses, tuple(lanes)
 
+    def between(self, begin: float, end: float) -> "Futures":
+        """What `of` needs to answer, just the same, for times from `begin` [s] on, of places up to `end` [s]."""
+        tracks: dict[str, Track] = {}
+        for name, track in self.tracks.items():
+            first, last = np.searchsorted(track.times, [begin, end])
+            first, last = max(int(first) - 1, 0), int(last) + 1
+            if track.times[-1] >= begin and track.times[0] - _EARLY <= end:
+                tracks[name] = Track(track.times[first:last], track.poses[first:last], track.lanes[first:last])
+        return Futures(tracks)
+
 
 def recorded_futures(moments: Sequence[Moment]) -> Futures:
     """The futures that a run's truth, step by step, amounts to."""
-    times: dict[str, list[float]] = {}
-    rows: dict[str, list[Floats]] = {}
-    lanes: dict[str, list[str]] = {}
-    for moment in moments:
-        objects = moment.objects
-        for row, name in enumerate(objects.ids):
-            times.setdefault(name, []).append(moment.time)
-            rows.setdefault(name, []).append(objects.boxes[row, :3])
-            lanes.setdefault(name, []).append(objects.lanes[row] if objects.lanes else "")
-    tracks: dict[str, Track] = {}
-    for name, instants in times.items():
-        poses = np.array(rows[name])
-        poses[:, 2] = np.unwrap(poses[:, 2])
-        tracks[name] = Track(np.array(instants), poses, tuple(lanes[name]))
-    return Futures(tracks)
+    owners = {name: row for row, name in enumerate(dict.fromkeys(name for one in moments for name in one.objects.ids))}
+    if not owners:
+        return Futures()
+    owned = np.array([owners[name] for one in moments for name in one.objects.ids])
+    times = np.repeat([one.time for one in moments], [len(one.objects.ids) for one in moments])
+    poses = np.concatenate([one.objects.boxes[:, :3] for one in moments])
+    lanes = [lane for one in moments for lane in one.objects.lanes or ("",) * len(one.objects.ids)]
+    order = np.argsort(owned, kind="stable")
+    parts = np.split(order, np.cumsum(np.bincount(owned))[:-1])
+    return Futures(
+        {name: _track(times[rows], poses[rows], lanes, rows) for name, rows in zip(owners, parts, strict=True)}
+    )
+
+
+def _track(times: Floats, poses: Floats, lanes: Sequence[str], rows: Integers) -> Track:
+    """The track of an object that is in the given rows of `lanes`."""
+    poses[:, 2] = np.unwrap(poses[:, 2])
+    return Track(times, poses, tuple(lanes[row] for row in rows.tolist()))

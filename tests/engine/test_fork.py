@@ -289,7 +289,7 @@ def test_an_engine_that_was_closed_goes_on_from_time_0(task: Task, street: Path)
         assert outcomes(glimpses(engine, asked)) == outcomes(glimpses(engine.witness, asked))
 
 
-def python(script: str, folder: Path, *words: str) -> str:
+def python(script: str, folder: Path, *words: str, **environment: str) -> str:
     """What a script in a process of its own prints; it must not complain, nor leave a temporary file in `folder`."""
     said = subprocess.run(  # noqa: S603 our own script
         [sys.executable, "-c", script, *words],
@@ -297,7 +297,7 @@ def python(script: str, folder: Path, *words: str) -> str:
         capture_output=True,
         text=True,
         timeout=TIMEOUT,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), "TMPDIR": str(folder)},
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), "TMPDIR": str(folder), **environment},
     )
     assert said.stderr == ""
     assert list(folder.iterdir()) == []
@@ -313,6 +313,20 @@ def test_a_drive_that_is_never_explained_does_not_keep_python_from_ending(tmp_pa
     folder = tmp_path / "temporary"
     folder.mkdir()
     assert python(script, folder, str(scenario_file(tmp_path, street))) not in ("", "()")
+
+
+def test_a_run_stays_in_one_thread_where_numpy_was_imported_before(tmp_path: Path) -> None:
+    script = (
+        "import numpy as np\n"
+        "from dvca_sumo.engine.forking import thread_count\n"
+        "from dvca_sumo.engine.processes import isolated\n"
+        "def threads():\n"
+        "    long = np.ones((400, 400))\n"
+        "    long @ long\n"
+        "    return thread_count()\n"
+        "print(list(isolated([threads], 1, 60.0)))\n"
+    )
+    assert python(script, tmp_path, OPENBLAS_NUM_THREADS="2") == "[(0, 1)]"
 
 
 def test_a_system_that_cannot_fork_has_the_replay_engine(tmp_path: Path) -> None:

@@ -77,3 +77,22 @@ def test_a_run_is_recorded_object_by_object_as_they_come_and_go() -> None:
     assert tracks["early"].poses[:, 0] == pytest.approx([50.0, 51.0, 52.0])
     assert tracks["late"].times == pytest.approx([0.2, 0.3, 0.4])
     assert tracks["late"].lanes == ("in_0",) * 3
+
+
+@pytest.mark.parametrize(("begin", "end"), [(0.0, math.inf), (4.0, 12.0), (4.06, 12.06), (9.5, 15.5), (math.inf, 6.0)])
+def test_a_part_of_the_records_answers_the_same_within_it(begin: float, end: float) -> None:
+    things = {"from the start": (0.0, 8.0), "all along": (0.0, 20.0), "later": (5.0, 11.0), "at last": (12.5, 20.0)}
+    times = [round(0.1 * step, 1) for step in range(200)]
+    whole = recorded_futures(
+        [
+            moment([Thing(name, time**1.1, 0.0) for name, (a, b) in things.items() if a <= time <= b], ego(time=time))
+            for time in times
+        ]
+    )
+    part = whole.between(begin, end)
+    for time in times:
+        if begin <= time <= end - PREDICTION_TIMES[-1]:
+            for name in things:
+                assert repr(part.of(name, time)) == repr(whole.of(name, time))
+    kept = sum(len(track.times) for track in part.tracks.values())
+    assert kept <= len(things) * max(min(end, 20.0) - begin + 0.4, 0.0) * 10
