@@ -86,9 +86,10 @@ class Record(msgspec.Struct):
     def believed_at(self, tick: int) -> LocalizationEstimate:
         """The localization estimate in force at a tick."""
         executions = self.executions[Component.LOCALIZATION]
-        for execution in reversed(executions[: tick + 1]):
-            if isinstance(execution.message, LocalizationEstimate):
-                return execution.message
+        for row in range(min(tick, len(executions) - 1), -1, -1):
+            message = executions[row].message
+            if isinstance(message, LocalizationEstimate):
+                return message
         raise IndexError(f"no localization estimate at or before tick {tick}")
 
     def moment_at(self, tick: int) -> Moment:

@@ -6,6 +6,7 @@ and it must begin where, and as fast as, the ego is.
 """
 
 import math
+from bisect import bisect_left
 
 import msgspec
 
@@ -24,6 +25,7 @@ from dvca_sumo.truth import EgoTruth, Moment
 from dvca_sumo.violations import Category, Ending, Violation
 
 FORESIGHT = 3.0  # [s] of a trajectory that must keep the rules: farther ahead, a sound plan may rest on a guess
+_FORESEEN = round(FORESIGHT * 10.0) + 1  # moments
 BESIDE = 1.0  # [m] sideways a trajectory may begin from where the ego believes to be
 SPEED_GAP = 3.0  # [m/s] likewise of the speed
 _STANDING = 0.2  # [m/s]
@@ -102,10 +104,9 @@ def _driven(record: Record, trajectory: Trajectory, tick: int) -> list[Moment]:
     origin = (ego.x, ego.y, ego.heading)
     poses = transferred(trajectory.points[:, [X, Y, HEADING]], (believed.x, believed.y, believed.heading), origin)
     moments: list[Moment] = []
-    for moment in record.moments:
+    first = bisect_left(record.moments, trajectory.time - 1e-6, key=lambda moment: moment.time)
+    for moment in record.moments[first : first + _FORESEEN]:
         elapsed = moment.time - trajectory.time
-        if not -1e-6 <= elapsed <= FORESIGHT:
-            continue
         row = min(round(elapsed * 10.0), len(poses) - 1)
         point = trajectory.points[row]
         truth = EgoTruth(

@@ -38,7 +38,7 @@ from dvca_sumo.stack.reference import StackFactory
 if sys.platform != "win32":
     import resource
 
-SPACING = 50  # world steps between the stem's checkpoints: what forking costs stays below a tenth of the run
+SPACING = 75  # world steps between the stem's checkpoints: what forking costs stays below a tenth of the run
 STEM_LOG = "stem"
 _PARKED_LOG = "parked"
 
