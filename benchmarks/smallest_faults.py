@@ -3,16 +3,16 @@
     python benchmarks/smallest_faults.py [--only perception.miss/cs1 ...] [--jobs 2]
 
 A fault counts when the violation that is to be explained is the ego's contact with the scenario's
-hazard. For each fault type and scenario:
+hazard; only where none is, a fault by which the ego breaks another rule first, say by speeding into it.
+For each fault type and scenario:
 
-1. up a ladder of magnitudes, both signs where both make sense, to the first that counts: active all the time,
-   and where that never does, in shorter windows around the meeting with the hazard;
-2. its magnitude down, its start later and its end earlier, each by bisection, round after round
-   until no step of the resolution in any of the three still counts: the minimum;
-3. the minimum plus the stated margin, so that no rounding decides, is the fault of the benchmark (the bare
-   minimum where the larger fault happens to do no harm);
-4. the same fault for the same time in another moment, the first that touches as many messages and
-   leaves the drive without a violation.
+1. up a ladder of magnitudes, both signs where both make sense, to the first that counts: active from some
+   seconds before the meeting with the hazard on, and where that never counts, in shorter windows around it;
+2. its magnitude down by bisection, and up by the stated margin, so that no rounding decides;
+3. its start later and its end earlier by bisection, in turn, until no step later or shorter still counts;
+   then the window grown by one step at either end, where that still counts;
+4. the same fault for the same time in another moment, the first at which it alters at least half as many
+   messages and nothing is violated.
 
 Writes dvca_sumo/bench/injected.toml after each instance; those that it holds already are not searched again
 unless named by --only. Drives are factual runs only, nothing is attributed.
@@ -42,11 +42,11 @@ from dvca_sumo.stack.reference import reference_stack
 from dvca_sumo.violations import Violation
 
 GRID = 0.1  # [s] of windows: one world step
-WHOLE = (0.0, math.inf)  # [s]
+APPROACH = 8.0  # [s] before the meeting, faults are active from then on at first
 MARGIN = 1.1  # times the smallest magnitude, at least one resolution more
 GROWN = 0.1  # [s] by which the narrowest window is grown at either end
 HARMLESS_EVERY = 2.0  # [s] between the moments tried
-AS_MANY = 0.9  # of the messages that the harmful fault altered before the contact
+ENOUGH = 0.5  # of the messages that the harmful one alters
 PATIENCE = 8.0  # [s] after the meeting: who has not met the hazard by then will not
 ROUNDS = 6
 SETTLE = 7.0  # [s] after the first violation: a close call within it belongs to the contact
@@ -139,15 +139,14 @@ class Ground:
         self.name = name
         self.hazard = HAZARDS[name]
         self.drives = 0
-        self.jobs = jobs
         self._scenario = dvca_sumo.load_scenario(f"nets/{name}.sumocfg")
         self._engine = Sown(self._scenario.configuration.net, None, jobs)
         healthy = self._engine.record(Task(self._scenario))
         if healthy.violations:
             raise SystemExit(f"{name} violates without a fault: {healthy.violations[0].detail}")
         self._departed, self._end = healthy.start, healthy.path[-1].time
-        self.seen_from: dict[str, float] = {}  # [s] by target: the first moment at which a fault found it
-        self._contacts: dict[str, float | None] = {}
+        self.is_strict = True  # the violation to be explained must be the contact itself
+        self._known: dict[str, Sequence[Violation]] = {}  # by fault
 
     def close(self) -> None:
         """End what is parked."""
@@ -155,7 +154,7 @@ class Ground:
 
     def contacts(self, trials: Sequence[Trial]) -> list[float | None]:
         """[s] after departure of the contact that each leads to, None where it leads to none."""
-        fresh = [text for text in dict.fromkeys(trial.text for trial in trials) if text not in self._contacts]
+        fresh = [text for text in dict.fromkeys(trial.text for trial in trials) if text not in self._known]
         latest = self._departed + self.hazard.meeting + PATIENCE
         stop = StopRule(after_violation=SETTLE, at=latest, settled=0.0, place=self.hazard.beyond)
         tasks = [Task(self._scenario, (planted_fault(text),), stop) for text in fresh]
@@ -163,20 +162,24 @@ class Ground:
         for text, answer in zip(fresh, self._engine.glimpses(tasks, lambda _row, _answer: None), strict=True):
             if isinstance(answer, Failure):
                 raise SystemExit(f"{self.name} {text}: {answer.reason}\n{answer.said}")
-            self._contacts[text] = self._contact(answer.violations)
-        return [self._contacts[trial.text] for trial in trials]
+            self._known[text] = answer.violations
+        return [self._contact(self._known[trial.text]) for trial in trials]
 
-    def whole(self, trials: Sequence[Trial]) -> list[tuple[bool, bool, int]]:
-        """Of whole drives: whether it leads to the contact, whether nothing is violated, messages altered."""
-        jobs = [partial(_whole, self._scenario, trial.text) for trial in trials]
-        self.drives += len(jobs)
-        answers: dict[int, tuple[bool, bool, int]] = {}
-        for row, answer in isolated(jobs, self.jobs, 600.0):
-            if isinstance(answer, Failure):
-                raise SystemExit(f"{self.name} {trials[row].text}: {answer.reason}\n{answer.said}")
-            violations, altered = answer
-            answers[row] = (self._contact(violations) is not None, not violations, altered)
-        return [answers[row] for row in range(len(trials))]
+    def whole(self, trial: Trial) -> tuple[bool, bool, int]:
+        """Of the whole drive: whether it leads to the contact, whether nothing is violated, messages altered."""
+        violations, altered = self._driven(trial, StopRule())
+        return self._contact(violations) is not None, not violations, altered
+
+    def altered(self, trial: Trial) -> int:
+        """How many messages it alters."""
+        return self._driven(trial, StopRule(at=self._departed + trial.end))[1]
+
+    def _driven(self, trial: Trial, stop: StopRule) -> tuple[list[Violation], int]:
+        self.drives += 1
+        ((_, answer),) = isolated([partial(_drive, self._scenario, trial.text, stop)], 1, 600.0)
+        if isinstance(answer, Failure):
+            raise SystemExit(f"{self.name} {trial.text}: {answer.reason}\n{answer.said}")
+        return answer
 
     def moments(self) -> list[float]:
         """[s] after departure at which a fault may be harmless."""
@@ -186,14 +189,14 @@ class Ground:
     def _contact(self, violations: Sequence[Violation]) -> float | None:
         if not violations:
             return None
-        violation = principal(violations)
-        name = (violation.object or "").rpartition(":")[2]
-        is_meant = violation.contact is not None and name.startswith(self.hazard.objects)
-        return violation.time - self._departed if is_meant else None
+        last = principal(violations) if self.is_strict else violations[-1]  # nothing is judged after a contact
+        name = (last.object or "").rpartition(":")[2]
+        is_meant = last.contact is not None and name.startswith(self.hazard.objects)
+        return last.time - self._departed if is_meant else None
 
 
-def _whole(scenario: Scenario, fault: str) -> tuple[list[Violation], int]:
-    task = Task(scenario, (planted_fault(fault),))
+def _drive(scenario: Scenario, fault: str, stop: StopRule) -> tuple[list[Violation], int]:
+    task = Task(scenario, (planted_fault(fault),), stop)
     record = rtest(task, partial(roadmap, scenario.configuration.net), reference_stack)
     return record.violations, sum(map(len, record.altered.values()))
 
@@ -201,12 +204,19 @@ def _whole(scenario: Scenario, fault: str) -> tuple[list[Violation], int]:
 def searched(ground: Ground, fault: str) -> Case:
     """One instance."""
     name = f"{fault}/{ground.name}"
-    minimum = smallest(ground, first(ground, fault))
-    chosen = robust(minimum)
-    ((is_contact, _, altered),) = ground.whole([chosen])
+    ground.is_strict = True
+    trial = first(ground, fault)
+    if trial is None:
+        ground.is_strict = False
+        trial = first(ground, fault)
+    if trial is None:
+        raise NotFoundError(f"{name}: no magnitude in any window leads to the contact")
+    minimum = smallest(ground, trial)
+    chosen = grown(minimum)
+    is_contact, _, altered = ground.whole(chosen)
     if not is_contact:  # not monotone: the minimum is what there is
         chosen = minimum
-        ((is_contact, _, altered),) = ground.whole([chosen])
+        is_contact, _, altered = ground.whole(chosen)
     if not is_contact:
         raise NotFoundError(f"{name}: {minimum.text} leads to the contact on a branch, and not on a whole drive")
     print(f"{name:<30}minimum {minimum.text}", flush=True)
@@ -224,10 +234,11 @@ class NotFoundError(Exception):
     """There is no such fault."""
 
 
-def first(ground: Ground, fault: str) -> Trial:
+def first(ground: Ground, fault: str) -> Trial | None:
     """The first trial up the ladder that leads to the contact: over the whole drive, else in shorter windows."""
     target = ground.hazard.objects[0] if "object" in fault_library()[fault].parameters else ""
-    for windows in ([WHOLE], _windows(ground.hazard.meeting)):
+    meeting = ground.hazard.meeting
+    for windows in ([(_grid(_steps(meeting - APPROACH)), math.inf)], _windows(meeting)):
         for rung in _rungs(INSTANCES[fault][1]):
             trials = [
                 Trial(fault, target, start, end, knob, sign, magnitude)
@@ -237,7 +248,7 @@ def first(ground: Ground, fault: str) -> Trial:
             for trial, contact in zip(trials, ground.contacts(trials), strict=True):
                 if contact is not None:
                     return trial
-    raise NotFoundError(f"{fault}/{ground.name}: no magnitude in any window leads to the contact")
+    return None
 
 
 def _rungs(knobs: Sequence[Knob]) -> list[list[tuple[Knob | None, float, float]]]:
@@ -254,17 +265,17 @@ def _windows(meeting: float) -> list[tuple[float, float]]:
     """Around the meeting, long ones first."""
     return [
         (_grid(_steps(max(meeting - before, 0.0))), _grid(_steps(meeting - before + length)))
-        for length in (6.0, 3.0, 1.5)
-        for before in (8.0, 6.0, 4.0, 2.5, 1.0, -1.0)
+        for length in (12.0, 6.0, 3.0, 1.5)
+        for before in (12.0, 10.0, 8.0, 6.0, 4.0, 2.5, 1.0, -1.0)
     ]
 
 
 def smallest(ground: Ground, trial: Trial) -> Trial:
-    """No step smaller, later or shorter still leads to the contact; or the rounds are spent."""
+    """The magnitude down to the least and up by its margin; then no start later and no end earlier, or `ROUNDS`."""
+    trial = _smaller(ground, trial)
     for _ in range(ROUNDS):
         before = trial
-        for moved in (_smaller, _later, _shorter):
-            trial = moved(ground, trial)
+        trial = _shorter(ground, _later(ground, trial))
         if trial == before:
             break
     return trial
@@ -274,12 +285,14 @@ def _smaller(ground: Ground, trial: Trial) -> Trial:
     if trial.knob is None:
         return trial
     step = trial.knob.resolution
-    return _least(
-        ground,
-        lambda count: msgspec.structs.replace(trial, magnitude=round(count * step, 6)),
-        0,
-        round(trial.magnitude / step),
-    )
+
+    def at(count: int) -> Trial:
+        return msgspec.structs.replace(trial, magnitude=round(count * step, 6))
+
+    least = _least(ground, at, 0, round(trial.magnitude / step))
+    count = round(least.magnitude / step)
+    robust = at(max(math.ceil(MARGIN * count - 1e-9), count + 1))
+    return least if ground.contacts([robust]) == [None] else robust
 
 
 def _later(ground: Ground, trial: Trial) -> Trial:
@@ -311,29 +324,20 @@ def _least(ground: Ground, at: Callable[[int], Trial], low: int, high: int) -> T
     return at(high)
 
 
-def robust(minimum: Trial) -> Trial:
-    """The minimum with its margin."""
-    magnitude = minimum.magnitude
-    if minimum.knob is not None:
-        step = minimum.knob.resolution
-        magnitude = round(max(math.ceil(MARGIN * magnitude / step - 1e-9) * step, magnitude + step), 6)
-    start, end = _grid(max(_steps(minimum.start - GROWN), 0)), _grid(_steps(minimum.end + GROWN))
-    return msgspec.structs.replace(minimum, magnitude=magnitude, start=start, end=end)
+def grown(trial: Trial) -> Trial:
+    """Active a little longer at either end."""
+    start, end = _grid(max(_steps(trial.start - GROWN), 0)), _grid(_steps(trial.end + GROWN))
+    return msgspec.structs.replace(trial, start=start, end=end)
 
 
 def harmless(ground: Ground, harmful: Trial, altered: int) -> Trial:
-    """The same for the same time at the first moment at which nothing is violated, and as much is altered."""
-    length, since = harmful.end - harmful.start, ground.seen_from.get(harmful.target, 0.0)
-    moments = [moment for moment in ground.moments() if moment >= since]
-    for row in range(0, len(moments), ground.jobs):
-        trials = [
-            msgspec.structs.replace(harmful, start=start, end=_grid(_steps(start + length)))
-            for start in moments[row : row + ground.jobs]
-        ]
-        for trial, (_, is_clean, count) in zip(trials, ground.whole(trials), strict=True):
-            if count > 0:
-                ground.seen_from.setdefault(harmful.target, trial.start)
-            if is_clean and count >= AS_MANY * altered:
+    """The same for the same time at the first moment at which nothing is violated, and enough is altered."""
+    length = harmful.end - harmful.start
+    for start in ground.moments():
+        trial = msgspec.structs.replace(harmful, start=start, end=_grid(_steps(start + length)))
+        if ground.altered(trial) >= ENOUGH * altered:
+            _, is_clean, _ = ground.whole(trial)
+            if is_clean:
                 return trial
     raise NotFoundError(f"{harmful.text} is harmless in {ground.name} at no other moment")
 
@@ -390,9 +394,9 @@ def write(path: Path, cases: Sequence[Case]) -> None:
     """The whole file anew."""
     head = [
         "# Found by benchmarks/smallest_faults.py: nothing in here is written by hand.",
-        "# Each fault is the smallest and briefest that still makes the ego hit the scenario's hazard, coordinate by",
-        f"# coordinate, plus a margin: magnitude x {MARGIN:g}, by at least one resolution; window {GROWN:g} s longer",
-        f"# at either end. Resolution: windows {GRID:g} s; magnitudes by fault type:",
+        "# Each fault is the smallest that still makes the ego hit the scenario's hazard, plus a margin; active in the",
+        f"# shortest window that then suffices, plus a margin. Margins: magnitude x {MARGIN:g}, at least one step",
+        f"# more; window {GROWN:g} s at either end. Resolution: windows {GRID:g} s; magnitudes by fault type:",
     ]
     for fault, (_, knobs) in INSTANCES.items():
         head += [f"#   {fault}: {knob.name} {knob.resolution:g}" for knob in knobs]
