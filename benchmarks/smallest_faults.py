@@ -2,8 +2,15 @@
 
     python benchmarks/smallest_faults.py [--only perception.miss/cs1 ...] [--jobs 2]
 
-A fault counts when the violation that is to be explained is the ego's contact with the scenario's
-hazard; only where none is, a fault by which the ego breaks another rule first, say by speeding into it.
+A fault counts when it is the cause, by itself and in its own time:
+
+- the violation that is to be explained is the ego's contact with the scenario's hazard; only where no fault
+  leads to that, one by which the ego breaks another rule first, say by speeding into it;
+- with everything else ideal the violation stays, from the start, from the fault's start and in the last seconds (ideal
+  prediction aside where perception is at fault: it knows what perception does not): no other component's
+  imperfection takes part;
+- it is not over before the violation is certain: with its component ideal from its end on, the violation stays.
+
 For each fault type and scenario:
 
 1. up a ladder of magnitudes, both signs where both make sense, to the first that counts: active from some
@@ -14,8 +21,8 @@ For each fault type and scenario:
 4. the same fault for the same time in another moment, the first at which it alters at least half as many
    messages and nothing is violated.
 
-Writes dvca_sumo/bench/injected.toml after each instance; those that it holds already are not searched again
-unless named by --only. Drives are factual runs only, nothing is attributed.
+Nothing is attributed. Writes dvca_sumo/bench/injected.toml after each instance; those that it holds already are not searched again
+unless named by --only.
 """
 
 import argparse
@@ -30,15 +37,25 @@ from pathlib import Path
 import msgspec
 
 import dvca_sumo
+from dvca_sumo.analysis.components import SUBSTITUTABLE
 from dvca_sumo.analysis.violating import principal
 from dvca_sumo.bench.cases import INJECTED, Case, injected_cases
 from dvca_sumo.engine.fork import ForkEngine
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.engine.replay import roadmap
-from dvca_sumo.interventions import fault_library, planted_fault
+from dvca_sumo.interventions import (
+    Ideal,
+    Intervention,
+    Selection,
+    fault_library,
+    planted_fault,
+    recorded_futures,
+)
+from dvca_sumo.messages import Component
 from dvca_sumo.run import StopRule, Task, rtest
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.stack.reference import reference_stack
+from dvca_sumo.stack.sources import StackSource
 from dvca_sumo.violations import Violation
 
 GRID = 0.1  # [s] of windows: one world step
@@ -119,6 +136,12 @@ INSTANCES: dict[str, tuple[str, tuple[Knob, ...]]] = {
 }
 
 
+LATE = 2.0  # [s] before the contact
+# Per component at fault: those that are made ideal beside it.
+OTHERS = {one: tuple(other for other in SUBSTITUTABLE if other is not one) for one in Component}
+OTHERS[Component.PERCEPTION] = (Component.LOCALIZATION, Component.CONTROL)
+
+
 class Sown(ForkEngine):
     """Branches of a drive without a fault, each with a fault from some moment on."""
 
@@ -140,10 +163,11 @@ class Ground:
         self.hazard = HAZARDS[name]
         self.drives = 0
         self._scenario = dvca_sumo.load_scenario(f"nets/{name}.sumocfg")
-        self._engine = Sown(self._scenario.configuration.net, None, jobs)
+        self._engine = Sown(self._scenario.configuration.net, StackSource(), jobs)
         healthy = self._engine.record(Task(self._scenario))
         if healthy.violations:
             raise SystemExit(f"{name} violates without a fault: {healthy.violations[0].detail}")
+        self._futures = recorded_futures(healthy.moments)
         self._departed, self._end = healthy.start, healthy.path[-1].time
         self.is_strict = True  # the violation to be explained must be the contact itself
         self._known: dict[str, Sequence[Violation]] = {}  # by fault
@@ -154,16 +178,37 @@ class Ground:
 
     def contacts(self, trials: Sequence[Trial]) -> list[float | None]:
         """[s] after departure of the contact that each leads to, None where it leads to none."""
-        fresh = [text for text in dict.fromkeys(trial.text for trial in trials) if text not in self._known]
+        fresh = {trial.text: trial for trial in trials if trial.text not in self._known}
+        found = dict(zip(fresh, self._violations([(planted_fault(text),) for text in fresh]), strict=True))
+        for text, trial in fresh.items():
+            contact = self._contact(found[text])
+            is_cause = contact is not None and all(self._violations(self._doubts(trial, contact)))
+            self._known[text] = found[text] if is_cause else ()
+        return [self._contact(self._known[trial.text]) for trial in trials]
+
+    def _doubts(self, trial: Trial, contact: float) -> list[tuple[Intervention, ...]]:
+        """What must violate as well, for the fault to be the cause."""
+        fault = planted_fault(trial.text)
+        beside = OTHERS[fault.component]
+        doubts: list[tuple[Intervention, ...]] = [
+            (fault, *(Ideal(component, Selection(start=start)) for component in beside))
+            for start in (0.0, trial.start, max(contact - LATE, trial.start))
+        ]
+        if fault.component in SUBSTITUTABLE and trial.end < contact:
+            doubts.append((fault, Ideal(fault.component, Selection(start=trial.end))))
+        return doubts
+
+    def _violations(self, drives: Sequence[tuple[Intervention, ...]]) -> list[Sequence[Violation]]:
         latest = self._departed + self.hazard.meeting + PATIENCE
         stop = StopRule(after_violation=SETTLE, at=latest, settled=0.0, place=self.hazard.beyond)
-        tasks = [Task(self._scenario, (planted_fault(text),), stop) for text in fresh]
-        self.drives += len(fresh)
-        for text, answer in zip(fresh, self._engine.glimpses(tasks, lambda _row, _answer: None), strict=True):
+        tasks = [Task(self._scenario, interventions, stop, self._futures) for interventions in drives]
+        self.drives += len(tasks)
+        found: list[Sequence[Violation]] = []
+        for task, answer in zip(tasks, self._engine.glimpses(tasks, lambda _row, _answer: None), strict=True):
             if isinstance(answer, Failure):
-                raise SystemExit(f"{self.name} {text}: {answer.reason}\n{answer.said}")
-            self._known[text] = answer.violations
-        return [self._contact(self._known[trial.text]) for trial in trials]
+                raise SystemExit(f"{self.name} {task.interventions}: {answer.reason}\n{answer.said}")
+            found.append(answer.violations)
+        return found
 
     def whole(self, trial: Trial) -> tuple[bool, bool, int]:
         """Of the whole drive: whether it leads to the contact, whether nothing is violated, messages altered."""

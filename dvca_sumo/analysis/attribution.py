@@ -12,11 +12,14 @@ from dvca_sumo.analysis.components import (
     SUBSTITUTABLE,
     ComponentAnswer,
     Verdict,
+    concluded,
+    named_instead,
     responsible_component,
 )
 from dvca_sumo.analysis.differences import Difference, differences
 from dvca_sumo.analysis.dtest import Dtest, Probe, Question, Setting
-from dvca_sumo.analysis.messages import MessageAnswer, violation_inducing_message
+from dvca_sumo.analysis.last_chance import decisive, is_by_luck
+from dvca_sumo.analysis.messages import MessageAnswer
 from dvca_sumo.analysis.specification import first_violating_plan
 from dvca_sumo.analysis.violating import principal
 from dvca_sumo.engine.protocol import Engine, RunFailedError
@@ -193,7 +196,7 @@ def _steps(found: Attribution, engine: Engine, dtest: Dtest, request: Request) -
     if answer.verdict is Verdict.PLANNING:
         yield _planning_message(found, engine)
     elif answer.verdict is Verdict.COMPONENT:
-        yield _component_message(found, dtest, answer, is_exact=request.repeats is None)
+        yield _decided(found, dtest, engine, is_exact=request.repeats is None)
 
 
 def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution) -> str:
@@ -228,19 +231,26 @@ def _planning_message(found: Attribution, engine: Engine) -> Attribution:
     return replace(found, message=finding.mark, differences=(Difference("trajectory", finding.reason, 0.0),))
 
 
-def _component_message(found: Attribution, dtest: Dtest, answer: ComponentAnswer, *, is_exact: bool) -> Attribution:
-    assert found.violation is not None
-    assert answer.component is not None  # a verdict of COMPONENT names one
-    record, component = found.record, answer.component
-    messages = violation_inducing_message(
-        dtest, record, component, found.violation.time, found.until, is_exact=is_exact
-    )
+def _decided(found: Attribution, dtest: Dtest, engine: Engine, *, is_exact: bool) -> Attribution:
+    answer, violation, record = found.components, found.violation, found.record
+    assert answer is not None  # the caller has it
+    assert violation is not None
+    component, messages = decisive(dtest, record, answer, violation.time, found.until, is_exact=is_exact)
+    if is_by_luck(dtest, messages, violation.time):
+        answer = concluded(Outcome.VIOLATES, answer.singles, answer.since)
+        return _planning_message(
+            replace(found, verdict=answer.verdict, reason=answer.reason, components=answer), engine
+        )
+    if component is not answer.component:
+        answer = named_instead(answer, component)
     mark = messages.last_safe
     return replace(
         found,
+        reason=answer.reason,
+        components=answer,
         messages=messages,
         message=mark,
-        differences=differences(record, MessageId(component, mark.index), dtest.futures, found.violation.object),
+        differences=differences(record, MessageId(component, mark.index), dtest.futures, violation.object),
         evidence=tuple(probe for probe in map(dtest.evidence, messages.proof) if probe is not None),
     )
 

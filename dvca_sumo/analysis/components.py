@@ -8,14 +8,13 @@ assumption of monotonicity:
   SAFE answer going backwards stands for Definition 10's substitution of the whole component;
 - in components: what one ideal component prevents, all four together prevent at least as late, so
   single substitutions are not asked later than where all four are enough;
-- upstream: a component before the one found, if it is enough at all, is so within `UPSTREAM` times the
-  time of the one found.
 
 The conclusion itself rests on none: it is confirmed at two adjacent messages, and a certified run asks
 the whole-component question as well.
 """
 
 import enum
+import math
 from collections.abc import Sequence
 
 import msgspec
@@ -28,7 +27,6 @@ from dvca_sumo.record import MessageMark, Record
 # In the order of the data flow: an idealized component may hide the fault of one before it.
 SUBSTITUTABLE = (Component.LOCALIZATION, Component.PERCEPTION, Component.PREDICTION, Component.CONTROL)
 
-UPSTREAM = 2
 _NEARLY_WHOLE = 1.5  # times a lookback: a drive that is not longer than this is asked as a whole
 _VECTOR = 4.0  # [s] before the violation from which single substitutions are shown when none can be enough
 
@@ -50,7 +48,8 @@ class ComponentAnswer(msgspec.Struct, frozen=True):
     component: Component | None
     alternatives: tuple[Component, ...]  # further single substitutions that suffice
     all_ideal: Outcome
-    singles: dict[Component, Outcome]  # at the earliest time each was asked for
+    singles: dict[Component, Outcome]  # at the earliest time they were asked for ...
+    since: float  # [s] ... which is this one
     reason: str
 
 
@@ -64,7 +63,7 @@ def responsible_component(dtest: Dtest, record: Record, time: float) -> Componen
     search = _Backwards(dtest, record, time)
     all_ideal = search.gallop_together()
     singles = search.gallop_singly() if all_ideal is Outcome.SAFE else search.vector()
-    return concluded(all_ideal, singles)
+    return concluded(all_ideal, singles, search.since)
 
 
 def mark_before(record: Record, component: Component, time: float, back: float | None) -> MessageMark | None:
@@ -94,6 +93,7 @@ class _Backwards:
         self._time = time
         self._levels = lookbacks(record.start, time)
         self._enough = 0  # level at which all four are enough
+        self.since = -math.inf  # [s] from when on single substitutions were asked for last
 
     def gallop_together(self) -> Outcome:
         """All four ideal: SAFE at the first level that is, else what the whole drive says."""
@@ -106,24 +106,20 @@ class _Backwards:
         return outcome
 
     def gallop_singly(self) -> dict[Component, Outcome]:
-        """Each alone, from where all four are enough; upstream ones a while longer than the first that is enough."""
-        outcomes = dict.fromkeys(SUBSTITUTABLE, Outcome.UNRESOLVED)
-        open_ones: Sequence[Component] = SUBSTITUTABLE
-        level, last = self._enough, len(self._levels) - 1
-        while open_ones and level <= last:
-            answers = self._ask([(component,) for component in open_ones], level)
-            outcomes.update(zip(open_ones, answers, strict=True))
-            enough = [component for component in SUBSTITUTABLE if outcomes[component] is Outcome.SAFE]
-            if enough and Outcome.SAFE in answers:
-                last = min(last, level + UPSTREAM.bit_length() - 1)
-            first = SUBSTITUTABLE.index(enough[0]) if enough else len(SUBSTITUTABLE)
-            open_ones = [one for one in SUBSTITUTABLE[:first] if outcomes[one] is not Outcome.SAFE]
+        """Each alone, from where all four are enough, to where one of them is."""
+        level, outcomes = self._enough, self._singly(self._enough)
+        while Outcome.SAFE not in outcomes.values() and level + 1 < len(self._levels):
             level += 1
+            outcomes = self._singly(level)
         return outcomes
 
     def vector(self) -> dict[Component, Outcome]:
         """Each alone, over the last seconds: to be seen, not to conclude from."""
         level = next((row for row, back in enumerate(self._levels) if back is None or back >= _VECTOR), 0)
+        return self._singly(level)
+
+    def _singly(self, level: int) -> dict[Component, Outcome]:
+        self.since = self._time - (self._levels[level] or math.inf)
         answers = self._ask([(component,) for component in SUBSTITUTABLE], level)
         return dict(zip(SUBSTITUTABLE, answers, strict=True))
 
@@ -133,13 +129,16 @@ class _Backwards:
         return self._dtest.ask_all([Question(ideal, mark) for ideal, mark in zip(ideals, marks, strict=True)])
 
 
-def concluded(all_ideal: Outcome, singles: dict[Component, Outcome]) -> ComponentAnswer:
-    """What the vector of counterfactuals says; see `responsible_component`."""
+def concluded(all_ideal: Outcome, singles: dict[Component, Outcome], since: float = -math.inf) -> ComponentAnswer:
+    """What the vector of counterfactuals says; see `responsible_component`.
+
+    `since` [s] is from when on single substitutions were asked for: by default, from the start.
+    """
     enough = tuple(component for component in SUBSTITUTABLE if singles[component] is Outcome.SAFE)
 
     def answer(verdict: Verdict, component: Component | None, reason: str) -> ComponentAnswer:
         others = tuple(one for one in enough if one is not component)
-        return ComponentAnswer(verdict, component, others, all_ideal, singles, reason)
+        return ComponentAnswer(verdict, component, others, all_ideal, singles, since, reason)
 
     if all_ideal is Outcome.VIOLATES:
         reason = "the violation stays although every other component is ideal"
@@ -157,3 +156,14 @@ def concluded(all_ideal: Outcome, singles: dict[Component, Outcome]) -> Componen
         reason = f"the run with ideal {doubtful[0]} could not be told, and it lies upstream of {enough[0]}"
         return answer(Verdict.UNRESOLVED, None, reason)
     return answer(Verdict.COMPONENT, enough[0], f"ideal {enough[0]} alone prevents it")
+
+
+def named_instead(answer: ComponentAnswer, component: Component) -> ComponentAnswer:
+    """The same vector, concluded from by the last chance: `component` could still have prevented it later."""
+    enough = {one for one in SUBSTITUTABLE if answer.singles[one] is Outcome.SAFE} - {component}
+    return msgspec.structs.replace(
+        answer,
+        component=component,
+        alternatives=tuple(one for one in SUBSTITUTABLE if one in enough),
+        reason=f"ideal {component} alone prevents it, and still does when it is too late for {answer.component}",
+    )

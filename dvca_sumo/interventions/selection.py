@@ -6,7 +6,7 @@ import msgspec
 
 from dvca_sumo.interventions.futures import Futures
 from dvca_sumo.interventions.states import State
-from dvca_sumo.messages import LocalizationEstimate, MessageId, Trajectory
+from dvca_sumo.messages import LocalizationEstimate, MessageId, TrackedObjects, Trajectory
 from dvca_sumo.roadmap import Route
 from dvca_sumo.truth import Moment
 
@@ -23,6 +23,8 @@ class Occasion(msgspec.Struct):
     route: Route
     sensor_range: float  # [m]
     futures: Futures
+    told: TrackedObjects | None = None  # what the component itself says of the objects; None: nothing
+    tracks: dict[str, int] = {}  # by simulator id: under which ids substitutes told of objects before; theirs to fill
 
 
 class Selection(msgspec.Struct, frozen=True):

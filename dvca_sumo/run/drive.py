@@ -93,6 +93,7 @@ class Drive:
         self._moments: list[Moment] = []
         self._violations: list[Violation] = []
         self._substituted: float | None = None  # [s] time of the first substituted message
+        self._tracks: dict[str, int] = {}  # see Occasion
         self._digest = Digest()
         self._digests: list[bytes] = []
 
@@ -205,6 +206,8 @@ class Drive:
             route=self.ego.route,
             sensor_range=self._stack.sensor_range,
             futures=self._task.futures,
+            told=_objects_in(message),
+            tracks=self._tracks,
         )
         result: Message | None = message
         for intervention, gate in self._interventions[component]:
@@ -282,6 +285,12 @@ class Drive:
             return Ending.CUT
         stop = min(rule.at, self._breach + rule.after_violation, self._contact + rule.after_contact)
         return Ending.CUT if moment.time >= stop - TICK else None
+
+
+def _objects_in(message: Message) -> TrackedObjects | None:
+    if isinstance(message, PredictedObjects):
+        return message.objects
+    return message if isinstance(message, TrackedObjects) else None
 
 
 def _checked(answer: object, kind: type[Answer]) -> Answer:

@@ -23,6 +23,7 @@ from dvca_sumo.messages import (
     Component,
     ControlCommand,
     Floats,
+    Integers,
     LocalizationEstimate,
     Message,
     PoseStep,
@@ -35,12 +36,14 @@ from dvca_sumo.messages import (
 )
 
 CONTROL_STEP = 0.01  # [s]
-# A substitute that takes over beside the trajectory steers back onto it like a vehicle, not by a jump: a
-# sideways motion would be one that odometry does not sense.
+# A substitute that takes over beside the trajectory, or at another speed, comes back to it like a vehicle, not
+# by a jump: no brake stops an ego at once, and odometry senses no sideways motion.
 _CLOSING = 0.1  # [m] lengthwise at most for each metre driven
 _CLOSING_TURN = 0.03  # [rad] likewise, on top of the trajectory's own turn
 _APPROACH = 3.0  # [m] it heads for a point on the trajectory so far ahead ...
 _APPROACH_TIME = 0.5  # [s] ... and so much time
+_SAME = 2.0  # [m] from where perception has an object at most, it is the same one
+_GAINING, _BRAKING = 4.0, 9.0  # [m/s^2] at most, until its speed is the trajectory's
 _LOST_BRAKING = 3.0  # [m/s^2] without any trajectory left to follow
 
 
@@ -53,7 +56,8 @@ def ideal_localization(occasion: Occasion) -> LocalizationEstimate:
 def ideal_perception(occasion: Occasion) -> TrackedObjects:
     """Every object in sensor range with true pose, size, class and velocity, and all signal states.
 
-    Ids are derived from the simulator's, so that an object keeps its id for life.
+    An object goes on under the id that perception itself gave it, else under one derived from the
+    simulator's, and keeps it for life: who follows it must not take it for a new one.
     """
     return _true_objects(occasion)[0]
 
@@ -84,7 +88,7 @@ def ideal_control(occasion: Occasion) -> ControlCommand:
     """The ego moves exactly as the current trajectory says (Apollo's sim-control).
 
     The planned motion over the next control step is applied in the ego's own frame; what the ego is
-    beside the trajectory, by its own belief, is closed gradually.
+    beside the trajectory, by its own belief, and what its speed is off, is closed gradually.
     """
     time = occasion.moment.time
     speed = occasion.moment.ego.speed
@@ -98,8 +102,10 @@ def ideal_control(occasion: Occasion) -> ControlCommand:
     gap = relative(_pose(here), believed_pose(occasion))
     ahead, left, turn = relative(_pose(there), _pose(here))
     homing = gap[2] + math.atan2(gap[1], _APPROACH + _APPROACH_TIME * speed)
+    forward = ahead + _clipped(gap[0], _CLOSING * abs(ahead))
+    slowest, fastest = speed - _BRAKING * CONTROL_STEP, speed + _GAINING * CONTROL_STEP
     step = PoseStep(
-        forward=ahead + _clipped(gap[0], _CLOSING * abs(ahead)),
+        forward=min(max(forward, slowest * CONTROL_STEP), fastest * CONTROL_STEP),
         left=left,
         turn=wrapped(turn) + _clipped(wrapped(homing), _CLOSING_TURN * abs(ahead)),
         acceleration=float(there[ACCELERATION]),
@@ -127,13 +133,31 @@ def _true_objects(occasion: Occasion) -> tuple[TrackedObjects, tuple[str, ...]]:
     names = tuple(objects.ids[row] for row in rows)
     tracked = TrackedObjects(
         moment.time,
-        np.array([key_of(name) for name in names], dtype=np.int64),
+        _tracks(occasion, names, boxes),
         objects.classes[rows],
         boxes,
         rotated(objects.velocities[rows], target[2] - source[2]),
         dict(moment.signals),
     )
     return tracked, names
+
+
+def _tracks(occasion: Occasion, names: tuple[str, ...], boxes: Floats) -> Integers:
+    """The id of each object; new ones are noted."""
+    tracks, told = occasion.tracks, occasion.told
+    new = [row for row, name in enumerate(names) if name not in tracks]
+    if new and told is not None and len(told.ids):
+        taken = set(tracks.values())
+        apart = np.hypot(*(boxes[new, None, :2] - told.boxes[None, :, :2]).transpose(2, 0, 1))
+        for pair in np.argsort(apart, axis=None, kind="stable").tolist():
+            one, other = divmod(pair, len(told.ids))
+            if apart[one, other] > _SAME:
+                break
+            name, track = names[new[one]], int(told.ids[other])
+            if name not in tracks and track not in taken:
+                tracks[name] = track
+                taken.add(track)
+    return np.array([tracks.setdefault(name, key_of(name)) for name in names], dtype=np.int64)
 
 
 def _row_at(trajectory: Trajectory, time: float) -> Floats:

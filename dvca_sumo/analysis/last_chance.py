@@ -1,0 +1,80 @@
+"""Which of several components that are each enough alone was the last that could have prevented the violation.
+
+Any ideal component may prevent a violation by luck, if it begins early enough: the ego is a little
+elsewhere by then. The one at fault can prevent it until the last moment at which anything can. A
+substitute upstream has gone through all components after it within `LATENCY`; so the responsible
+component is the most upstream of those whose last chance is not earlier than that before the latest.
+
+Where even that lies more than `PROMPT` before the violation, it is asked as well whether all four,
+ideal from the start, prevent it: if not, the violation is planning's, and what helped was luck.
+"""
+
+from collections.abc import Iterator
+
+from dvca_sumo.analysis.bisection import Outcome
+from dvca_sumo.analysis.components import SUBSTITUTABLE, ComponentAnswer, mark_before
+from dvca_sumo.analysis.dtest import Dtest, Question
+from dvca_sumo.analysis.messages import MessageAnswer, violation_inducing_message
+from dvca_sumo.messages import Component
+from dvca_sumo.record import Record
+
+LATENCY = 0.15  # [s] a cycle of the components that run ten times a second, and a half
+PROMPT = 2.5  # [s]
+
+
+def decisive(
+    dtest: Dtest, record: Record, answer: ComponentAnswer, time: float, until: float, *, is_exact: bool
+) -> tuple[Component, MessageAnswer]:
+    """The component that had the last chance, and its last message that could have prevented the violation.
+
+    Args:
+        dtest: To ask; must know the single substitutions of `answer`.
+        record: The factual run.
+        answer: Names a component that is enough.
+        time: [s] of the violation.
+        until: [s] at which a safe run ends.
+        is_exact: Whether runs repeat bit for bit.
+    """
+    component = answer.component
+    assert component is not None  # see above
+    seen = {component}
+    while True:
+        messages = violation_inducing_message(dtest, record, component, time, until, is_exact=is_exact)
+        later = _later(dtest, record, answer, component, messages.last_safe.time, time)
+        rival = next((one for one in later if one not in seen), None)
+        if rival is None:
+            return component, messages
+        seen.add(rival)
+        component = rival
+
+
+def is_by_luck(dtest: Dtest, messages: MessageAnswer, time: float) -> bool:
+    """Whether the last chance came long before the violation at `time` [s], and all four ideal are not enough."""
+    if time - messages.last_safe.time <= PROMPT:
+        return False
+    return dtest.ask(Question(SUBSTITUTABLE)) is Outcome.VIOLATES
+
+
+def _later(
+    dtest: Dtest, record: Record, answer: ComponentAnswer, component: Component, chance: float, time: float
+) -> Iterator[Component]:
+    """Components that could have prevented it later than `component`, whose last chance was at `chance` [s].
+
+    Those upstream count as later up to `LATENCY` earlier. One that was not enough from where all were
+    asked is not asked after that again.
+    """
+    place = SUBSTITUTABLE.index(component)
+    for other in SUBSTITUTABLE[:place]:
+        is_open = answer.singles[other] is not Outcome.SAFE and chance - LATENCY < answer.since
+        if is_open and _is_enough(dtest, record, other, chance - LATENCY, time):
+            yield other
+    for other in SUBSTITUTABLE[place + 1 :]:
+        if answer.singles[other] is Outcome.SAFE and _is_enough(dtest, record, other, chance + LATENCY, time):
+            yield other
+
+
+def _is_enough(dtest: Dtest, record: Record, component: Component, since: float, time: float) -> bool:
+    mark = mark_before(record, component, since, 0.0)
+    if mark is not None and mark.time > time:
+        return False
+    return dtest.ask(Question((component,), mark)) is Outcome.SAFE
