@@ -12,7 +12,7 @@ For each fault type and scenario:
 3. its start later and its end earlier by bisection, in turn, until no step later or shorter still counts;
    then the window grown by one step at either end, where that still counts;
 4. the same fault for the same time in another moment, the first at which it alters at least half as many
-   messages and nothing is violated.
+   messages and nothing is violated; where there is none, for half the time, and so on.
 
 Writes dvca_sumo/bench/injected.toml after each instance; those that it holds already are not searched again
 unless named by --only. Drives are factual runs only, nothing is attributed.
@@ -39,6 +39,7 @@ from dvca_sumo.interventions import fault_library, planted_fault
 from dvca_sumo.run import StopRule, Task, rtest
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.stack.reference import reference_stack
+from dvca_sumo.stack.sources import StackSource
 from dvca_sumo.violations import Violation
 
 GRID = 0.1  # [s] of windows: one world step
@@ -140,7 +141,7 @@ class Ground:
         self.hazard = HAZARDS[name]
         self.drives = 0
         self._scenario = dvca_sumo.load_scenario(f"nets/{name}.sumocfg")
-        self._engine = Sown(self._scenario.configuration.net, None, jobs)
+        self._engine = Sown(self._scenario.configuration.net, StackSource(), jobs)
         healthy = self._engine.record(Task(self._scenario))
         if healthy.violations:
             raise SystemExit(f"{name} violates without a fault: {healthy.violations[0].detail}")
@@ -331,14 +332,17 @@ def grown(trial: Trial) -> Trial:
 
 
 def harmless(ground: Ground, harmful: Trial, altered: int) -> Trial:
-    """The same for the same time at the first moment at which nothing is violated, and enough is altered."""
-    length = harmful.end - harmful.start
-    for start in ground.moments():
-        trial = msgspec.structs.replace(harmful, start=start, end=_grid(_steps(start + length)))
-        if ground.altered(trial) >= ENOUGH * altered:
-            _, is_clean, _ = ground.whole(trial)
-            if is_clean:
+    """The same for the same time at the first moment at which nothing is violated, and enough is altered.
+
+    What breaks a rule wherever it lasts so long, as full throttle does, is active for half the time, or a quarter ...
+    """
+    length, least = _steps(harmful.end - harmful.start), ENOUGH * altered
+    while length > 0:
+        for start in ground.moments():
+            trial = msgspec.structs.replace(harmful, start=start, end=_grid(_steps(start) + length))
+            if ground.altered(trial) >= least and ground.whole(trial)[1]:
                 return trial
+        length, least = length // 2, 0.5 * least
     raise NotFoundError(f"{harmful.text} is harmless in {ground.name} at no other moment")
 
 
