@@ -40,7 +40,7 @@ EXACT = (
 JITTERED = (
     Case("cs5", "localization.lateral"),
     Case("cs1", "perception.miss"),
-    Case("cs1", "prediction.wrong"),
+    Case("cs2", "prediction.wrong"),
     Case("cs5", "planning.path"),
     Case("cs5", "control.lateral"),
 )
