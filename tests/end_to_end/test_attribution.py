@@ -29,7 +29,7 @@ EXACT = (
     Case("cs3", "localization.lateral:left=2.5,start=10,end=13"),
     Case("cs2", "perception.longitudinal"),
     Case("cs4", "perception.miss:start=14,end=17"),
-    Case("cs1", "prediction.wrong:start=10,end=13"),
+    Case("cs1", "prediction.wrong:start=8.5,end=13"),
     Case("cs4", "prediction.wrong:start=14,end=17"),
     Case("cs1", "planning.speed:start=5,end=8"),
     Case("cs1", "planning.none:start=8"),
@@ -40,7 +40,7 @@ EXACT = (
 JITTERED = (
     Case("cs5", "localization.lateral"),
     Case("cs1", "perception.miss"),
-    Case("cs1", "prediction.wrong"),
+    Case("cs2", "prediction.wrong"),
     Case("cs5", "planning.path"),
     Case("cs5", "control.lateral"),
 )
