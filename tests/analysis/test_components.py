@@ -8,7 +8,6 @@ from analysis.scenes import CRASHED, SAFE, START, VIOLATING, Answers, FakeEngine
 from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.analysis.components import (
     SUBSTITUTABLE,
-    UPSTREAM,
     ComponentAnswer,
     Verdict,
     lookbacks,
@@ -160,15 +159,11 @@ def test_a_component_is_asked_no_later_than_where_all_together_are_enough() -> N
     assert backs(questions, Component.PERCEPTION) == [2.0, 4.0, 8.0]
 
 
-def test_upstream_components_are_asked_a_while_further_back_than_the_one_that_is_enough() -> None:
+def test_once_one_is_enough_none_is_asked_further_back() -> None:
     found, questions = asked_of(enough_before(together=1.5, localization=3.5, prediction=1.5))
-    assert (found.component, found.alternatives) == (Component.LOCALIZATION, (Component.PREDICTION,))
-    assert backs(questions, Component.PERCEPTION) == [2.0, 4.0]
-    assert backs(questions, Component.PREDICTION) == [2.0]
-
-    found, questions = asked_of(enough_before(together=1.5, localization=2.0 * UPSTREAM + 1.0, prediction=1.5))
-    assert found.component is Component.PREDICTION
-    assert backs(questions, Component.LOCALIZATION) == [2.0, 2.0 * UPSTREAM]
+    assert (found.component, found.alternatives) == (Component.PREDICTION, ())
+    assert backs(questions, Component.LOCALIZATION) == [2.0]
+    assert found.since == pytest.approx(VIOLATED - 2.0)
 
 
 def test_a_component_that_must_be_ideal_from_the_start_is_found() -> None:
@@ -190,4 +185,4 @@ def test_a_component_costs_a_few_questions_for_each_doubling_of_time() -> None:
             found, questions = asked_of(enough_before(together=back, **{component.value: back}))
             assert found.component is component
             levels = len(backs(questions, *SUBSTITUTABLE))
-            assert len(questions) <= levels + len(SUBSTITUTABLE) * UPSTREAM.bit_length()
+            assert len(questions) <= levels + len(SUBSTITUTABLE)

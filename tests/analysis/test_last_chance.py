@@ -1,0 +1,100 @@
+"""Several components are enough: the last that could have prevented it is responsible, upstream among equals."""
+
+import pytest
+
+from analysis.scenes import START, FakeEngine, answering, asking, collision, drive
+from dvca_sumo.analysis.bisection import Outcome
+from dvca_sumo.analysis.components import ComponentAnswer, responsible_component
+from dvca_sumo.analysis.dtest import Dtest
+from dvca_sumo.analysis.last_chance import LATENCY, PROMPT, decisive, is_by_luck
+from dvca_sumo.analysis.messages import MessageAnswer
+from dvca_sumo.messages import Component
+
+LOCALIZATION, PERCEPTION, PREDICTION, CONTROL = (
+    Component.LOCALIZATION,
+    Component.PERCEPTION,
+    Component.PREDICTION,
+    Component.CONTROL,
+)
+TIME = START + 12.0  # [s]
+DRIVE = drive(duration=20.0, violations=(collision(TIME),))
+CYCLE = 0.1  # [s]
+
+
+def last(component: Component, before: float) -> int:
+    """The component's message so long before the violation [s]."""
+    return DRIVE.first_at(component, TIME - before)
+
+
+def asked(**befores: float) -> tuple[Component, MessageAnswer, ComponentAnswer, Dtest]:
+    enough = {Component(name): last(Component(name), before) for name, before in befores.items()}
+    dtest = asking(FakeEngine(answering(DRIVE, enough)))
+    answer = responsible_component(dtest, DRIVE, TIME)
+    return *decisive(dtest, DRIVE, answer, TIME, TIME + 4.0, is_exact=True), answer, dtest
+
+
+def test_of_two_with_the_same_last_chance_the_upstream_one_is_responsible() -> None:
+    component, messages, _, _ = asked(perception=0.8, prediction=0.8)
+    assert component is PERCEPTION
+    assert messages.last_safe.index == last(PERCEPTION, 0.8)
+
+
+def test_one_cycle_earlier_upstream_is_the_same_chance() -> None:
+    assert asked(perception=0.8 + CYCLE, prediction=0.8)[0] is PERCEPTION
+
+
+def test_one_that_could_prevent_it_only_earlier_did_so_by_luck() -> None:
+    component, messages, answer, _ = asked(localization=0.95, perception=0.4)
+    assert answer.component is LOCALIZATION
+    assert component is PERCEPTION
+    assert messages.last_safe.index == last(PERCEPTION, 0.4)
+
+
+def test_one_downstream_that_could_prevent_it_later_is_responsible() -> None:
+    assert asked(perception=0.9, control=0.3)[0] is CONTROL
+
+
+def test_one_upstream_that_was_just_out_of_reach_of_the_common_question_is_found() -> None:
+    component, _, answer, _ = asked(perception=1.0 + CYCLE, prediction=1.0)
+    assert answer.component is PREDICTION  # perception was not enough from 1 s before on
+    assert component is PERCEPTION
+
+
+def test_one_far_upstream_in_time_is_not_asked_again() -> None:
+    component, _, _, dtest = asked(localization=5.0, perception=0.5)
+    assert component is PERCEPTION
+    assert sum(probe.question.ideal == (LOCALIZATION,) for probe in dtest.probes) == 1
+
+
+def test_a_single_one_costs_no_further_question_about_others() -> None:
+    _, _, _, dtest = asked(control=0.5)
+    others = [probe.question.ideal for probe in dtest.probes if probe.question.ideal != (CONTROL,)]
+    assert len(others) == len(set(others))
+
+
+def test_a_late_chance_is_no_luck_and_is_not_asked_about() -> None:
+    _, messages, _, dtest = asked(perception=PROMPT - 0.5)
+    count = len(dtest.probes)
+    assert not is_by_luck(dtest, messages, TIME)
+    assert len(dtest.probes) == count
+
+
+@pytest.mark.parametrize("is_enough_from_the_start", [True, False])
+def test_an_early_chance_is_luck_when_all_ideal_from_the_start_fail(*, is_enough_from_the_start: bool) -> None:
+    enough = answering(DRIVE, {CONTROL: last(CONTROL, PROMPT + 0.5)})
+    nothing = answering(DRIVE, {})
+
+    def answers(task):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+        substituted = [one for one in task.interventions if hasattr(one, "selection")]
+        is_whole = len(substituted) == 4 and all(one.selection.start == 0.0 for one in substituted)
+        return (enough if not is_whole or is_enough_from_the_start else nothing)(task)
+
+    dtest = asking(FakeEngine(answers))
+    answer = responsible_component(dtest, DRIVE, TIME)
+    assert answer.all_ideal is Outcome.SAFE
+    _, messages = decisive(dtest, DRIVE, answer, TIME, TIME + 4.0, is_exact=True)
+    assert is_by_luck(dtest, messages, TIME) is not is_enough_from_the_start
+
+
+def test_the_latency_is_that_of_components_that_run_ten_times_a_second() -> None:
+    assert CYCLE < LATENCY < 2.0 * CYCLE
