@@ -38,7 +38,7 @@ from dvca_sumo.bench.baselines.paper_procedure import algorithm_1
 from dvca_sumo.bench.baselines.procedure import Baseline, Reply, Situation
 from dvca_sumo.bench.baselines.scoring import baseline_scores
 from dvca_sumo.bench.baselines.whole_runs import whole_runs
-from dvca_sumo.bench.cases import Case
+from dvca_sumo.bench.cases import Case, injected_cases
 from dvca_sumo.bench.runs import Setting, analysis_of
 from dvca_sumo.bench.score import BaselineScore, Score
 from dvca_sumo.bench.store import Store
@@ -391,13 +391,7 @@ def test_a_drive_without_violation_leaves_them_nothing_to_explain() -> None:
 
 
 def test_a_missed_pedestrian_as_each_one_explains_it() -> None:
-    case = Case(
-        "injected",
-        "perception.miss/cs1",
-        "nets/cs1.sumocfg",
-        PERCEPTION,
-        fault="perception.miss:object=pedestrian,start=10.7,end=13.3",
-    )
+    case = next(case for case in injected_cases() if case.name == "perception.miss/cs1")
     names = tuple(one.name for one in available_baselines())
     found = analysis_of(case, Setting(has_controls=False, baselines=names)).baselines
     assert set(found) == set(names)
