@@ -12,7 +12,7 @@ OnScore = Callable[[Score, int], None]  # a case's score, and how many are left
 
 
 def run_benchmark(
-    cases: Sequence[Case], settings: Sequence[Setting], jobs: int, store: Store | None, on_score: OnScore
+    cases: Sequence[Case], settings: Sequence[Setting], jobs: int, store: Store[Score] | None, on_score: OnScore
 ) -> list[Score]:
     """The scores of all cases under each setting, in their order.
 
@@ -20,7 +20,7 @@ def run_benchmark(
     not be analysed is not kept: the next run tries it again.
     """
     asked = [(case, setting) for setting in settings for case in cases]
-    known = {row: score for row, pair in enumerate(asked) if store and (score := store.find(_key(*pair)))}
+    known = {row: score for row, pair in enumerate(asked) if store and (score := store.find(question_key(*pair)))}
     left = len(asked) - len(known)
     for setting in settings:
         rows = [row for row, pair in enumerate(asked) if pair[1] is setting and row not in known]
@@ -28,10 +28,11 @@ def run_benchmark(
             known[rows[number]] = score
             left -= 1
             if store is not None and score.verdict != FAILED:
-                store.add(_key(*asked[rows[number]]), score)
+                store.add(question_key(*asked[rows[number]]), score)
             on_score(score, left)
     return [known[row] for row in range(len(asked))]
 
 
-def _key(case: Case, setting: Setting) -> str:
+def question_key(case: Case, setting: Setting) -> str:
+    """Under which the score of a case is kept."""
     return key_of([case, setting.seed, setting.repeats, setting.has_controls, setting.baselines, versions()])

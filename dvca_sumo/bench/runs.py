@@ -1,7 +1,7 @@
 """Cases analysed side by side, each in a process of its own, as they finish."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
 import msgspec
@@ -20,7 +20,7 @@ from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.record import Record
 from dvca_sumo.violations import Answer
 
-_TIMEOUT = 3600.0  # [s] of wall time for one case: only a hang takes so long
+TIMEOUT = 3600.0  # [s] of wall time for one case: only a hang takes so long
 
 Attribute = Callable[[api.FactualDrive], Attribution]
 
@@ -40,15 +40,21 @@ class Setting(msgspec.Struct, frozen=True):
         return "exact" if self.repeats is None else "jitter"
 
 
-def analysed(cases: Sequence[Case], setting: Setting, jobs: int) -> Iterator[tuple[int, Score]]:
+def analysed(cases: Iterable[Case], setting: Setting, jobs: int) -> Iterator[tuple[int, Score]]:
     """(row of the case, its score), as they finish; `jobs` cases at once.
 
     A case whose process crashed or hung, or that cannot be run, has a score all the same: `failed`.
     """
-    work = [partial(analysis_of, case, setting) for case in cases]
-    for row, answer in isolated(work, jobs, _TIMEOUT):
+    begun: list[Case] = []
+
+    def work() -> Iterator[Callable[[], Score]]:
+        for case in cases:
+            begun.append(case)
+            yield partial(analysis_of, case, setting)
+
+    for row, answer in isolated(work(), jobs, TIMEOUT):
         if isinstance(answer, Failure):
-            yield row, failed(cases[row], setting.mode, setting.seed or 0, answer.reason)
+            yield row, failed(begun[row], setting.mode, setting.seed or 0, answer.reason)
         else:
             yield row, answer
 
@@ -61,7 +67,7 @@ def analysis_of(case: Case, setting: Setting) -> Score:
         RunFailedError: A run crashed or hung.
     """
     begin = time.perf_counter()
-    drive = _driven(case, setting, case.fault, case.bug)
+    drive = driven(case.scenario, case.ego, case.begin, setting, case.fault, case.bug)
     factual = time.perf_counter() - begin
     begin = time.perf_counter()
     found = setting.attribute(drive)
@@ -84,27 +90,30 @@ def judged(
         walls=walls,
         is_proven=is_proven(drive, found) if is_exact else None,
         controls=_controls(case, setting, drive.record) if setting.has_controls else None,
-        baselines=_baselines(case, setting, altered) if setting.baselines else {},
+        baselines=_baselines(case, setting, altered, drive.record) if setting.baselines else {},
     )
 
 
-def _baselines(case: Case, setting: Setting, altered: tuple[int, ...]) -> dict[str, BaselineScore]:
+def _baselines(case: Case, setting: Setting, altered: tuple[int, ...], record: Record) -> dict[str, BaselineScore]:
     """On a drive of their own: they must not find what the analysis has left behind."""
     asked = [BASELINES[name] for name in setting.baselines]
-    healthy = _driven(case, setting, "", "")
+    if not record.violations:
+        return no_violation(asked)
+    healthy = driven(case.scenario, case.ego, case.begin, setting)
     healthy.engine.close()
-    drive = _driven(case, setting, case.fault, case.bug)
+    drive = driven(case.scenario, case.ego, case.begin, setting, case.fault, case.bug)
     try:
-        if not drive.record.violations:
-            return no_violation(asked)
         situation = Situation(drive, principal(drive.record.violations), healthy.record, case.component)
         return baseline_scores(asked, situation, altered)
     finally:
         drive.engine.close()
 
 
-def _driven(case: Case, setting: Setting, fault: str, bug: str, scenario: str = "") -> api.FactualDrive:
-    loaded = api.load_scenario(scenario or case.scenario, case.ego, setting.seed, begin=case.begin)
+def driven(
+    scenario: str, ego: str | None, begin: float | None, setting: Setting, fault: str = "", bug: str = ""
+) -> api.FactualDrive:
+    """A drive in this process, with a fault or a bug or with none; raises what `api.drive` does."""
+    loaded = api.load_scenario(scenario, ego, setting.seed, begin=begin)
     faults = [fault] if fault else []
     return api.drive(loaded, faults, repeats=setting.repeats, jobs=1, bug=bug or None)
 
@@ -119,7 +128,7 @@ def _controls(case: Case, setting: Setting, record: Record) -> Controls:
 
 
 def _is_safe(case: Case, setting: Setting, fault: str, bug: str, scenario: str = "") -> bool | None:
-    drive = _driven(case, setting, fault, bug, scenario)
+    drive = driven(scenario or case.scenario, case.ego, case.begin, setting, fault, bug)
     drive.engine.close()
     if drive.record.violations:
         return False

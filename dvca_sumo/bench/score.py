@@ -60,6 +60,7 @@ class Score(msgspec.Struct, frozen=True):
     simulated_s: float
     factual_wall_s: float
     attribution_wall_s: float
+    violation: str | None  # kind of the one that was explained; None: there was none
     verdict: str
     reason: str
     is_proven: bool | None  # by runs of their own, of the definition of the reported message; None: not asked
@@ -116,6 +117,7 @@ def scored(
         simulated_s=sum(probe.simulated for probe in found.probes),
         factual_wall_s=walls[0],
         attribution_wall_s=walls[1],
+        violation=None if found.violation is None else found.violation.kind,
         verdict=found.verdict.value,
         reason=found.reason,
         is_proven=is_proven,
@@ -145,6 +147,7 @@ def failed(case: Case, mode: Mode, seed: int, reason: str) -> Score:
         simulated_s=0.0,
         factual_wall_s=0.0,
         attribution_wall_s=0.0,
+        violation=None,
         verdict=FAILED,
         reason=reason,
         is_proven=None,

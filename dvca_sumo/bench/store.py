@@ -1,12 +1,13 @@
-"""Scores kept on disk as they are found, so that an interrupted benchmark goes on where it stopped."""
+"""Answers kept on disk as they are found, so that an interrupted benchmark goes on where it stopped."""
 
 import hashlib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import msgspec
 
-from dvca_sumo.bench.score import Score
+Kept = TypeVar("Kept")
 
 
 class StoreError(ValueError):
@@ -15,20 +16,20 @@ class StoreError(ValueError):
 
 class _Line(msgspec.Struct, frozen=True):
     key: str
-    score: Score
+    value: msgspec.Raw
 
 
-class Store:
-    """A file of scores, one a line, each under the key of what was asked."""
+class Store(Generic[Kept]):
+    """A file of answers of one kind, one a line, each under the key of what was asked."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, kind: type[Kept]) -> None:
         """Read what is there.
 
         Raises:
             StoreError: The file cannot be read or made, or holds something else.
         """
         self._path = path
-        self._known: dict[str, Score] = {}
+        self._known: dict[str, Kept] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
@@ -39,19 +40,19 @@ class Store:
         for number, text in enumerate(lines, 1):
             try:
                 line = msgspec.json.decode(text, type=_Line)
+                self._known[line.key] = msgspec.json.decode(line.value, type=kind)
             except (msgspec.DecodeError, msgspec.ValidationError) as error:
-                raise StoreError(f"line {number} of {path} is no score: {error}") from None
-            self._known[line.key] = line.score
+                raise StoreError(f"line {number} of {path} is no {kind.__name__}: {error}") from None
 
-    def find(self, key: str) -> Score | None:
+    def find(self, key: str) -> Kept | None:
         """What was found for that question before."""
         return self._known.get(key)
 
-    def add(self, key: str, score: Score) -> None:
-        """Keep a score: it is on disk when this returns."""
-        self._known[key] = score
+    def add(self, key: str, value: Kept) -> None:
+        """Keep an answer: it is on disk when this returns."""
+        self._known[key] = value
         with self._path.open("ab") as file:
-            file.write(msgspec.json.encode(_Line(key, score)) + b"\n")
+            file.write(msgspec.json.encode(_Line(key, msgspec.Raw(msgspec.json.encode(value)))) + b"\n")
 
 
 def key_of(parts: Sequence[object]) -> str:

@@ -3,14 +3,18 @@
 import json
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
+import msgspec
 
 from dvca_sumo.api import CPUS
 from dvca_sumo.bench.baselines import BASELINES, available_baselines
 from dvca_sumo.bench.benchmark import run_benchmark
 from dvca_sumo.bench.cases import WRITTEN
+from dvca_sumo.bench.places import BUILT_IN, HealthyDrive, Place, healthy_drives, places_of
+from dvca_sumo.bench.random_faults import PATIENCE, Drawing, random_scores
 from dvca_sumo.bench.runs import Setting
 from dvca_sumo.bench.score import Score
 from dvca_sumo.bench.store import Store
@@ -35,7 +39,12 @@ class _Countdown:
 
 
 @click.command()
-@click.option("--suite", type=click.Choice([*WRITTEN, "all"]), default="all", show_default=True, help="Which cases.")
+@click.argument("sumocfg", type=click.Path(path_type=Path), required=False)
+@click.option("--suite", type=click.Choice([*WRITTEN, "all"]), help="Which of the written cases [default: all]")
+@click.option("--random", "wanted", type=click.IntRange(1), metavar="N", help="N random faults that violate, instead.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="Of the random faults [default: 1]")
+@click.option("--ego", metavar="ID|auto", help="The ego of SUMOCFG; see `run`.")
+@click.option("--begin", type=float, metavar="T", help="Start of the simulation of SUMOCFG [s].")
 @click.option("--jitter", is_flag=True, help="In jitter mode as well, the paper's setting.")
 @click.option("--repeats", type=click.IntRange(1), help=f"Runs of each question in jitter mode [default: {REPEATS}]")
 @click.option("--baselines", is_flag=True, help="Beside ours: observation, whole runs, the paper's procedure, ddmin.")
@@ -43,7 +52,12 @@ class _Countdown:
 @click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Results; to go on from there.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
 def bench(
-    suite: str,
+    sumocfg: Path | None,
+    suite: str | None,
+    wanted: int | None,
+    seed: int | None,
+    ego: str | None,
+    begin: float | None,
     jitter: bool,  # noqa: FBT001
     repeats: int | None,
     baselines: bool,  # noqa: FBT001
@@ -51,28 +65,66 @@ def bench(
     output: Path | None,
     as_json: bool,  # noqa: FBT001
 ) -> None:
-    r"""How often the analysis is right, where the truth is known: the paper's tables, beside the paper's figures.
+    """How often the analysis is right, where the truth is known: the paper's tables, beside the paper's figures.
+
+    With --random: the same on faults drawn at random, on the built-in scenarios or on any SUMOCFG, in drives that
+    are clean without the fault. Where neither --ego nor the scenario names an ego, nor --begin a time, several are
+    picked at times spread over its traffic.
 
     An interrupted benchmark goes on where it stopped when it is given the same folder again.
 
     \b
     Exit codes: 0 all checks hold; 1 some do not; 2 usage; 3 bad input; 70 internal error; 130 interrupted.
-    """
+    """  # noqa: D301 - click wants the very character, not its escape
     if repeats is not None and not jitter:
         raise click.UsageError("--repeats goes with --jitter: in exact mode every run is the same")
+    if wanted is None and (sumocfg, seed, ego, begin) != (None,) * 4:
+        raise click.UsageError("SUMOCFG, --seed, --ego and --begin go with --random: the written cases have their own")
+    if wanted is not None and suite is not None:
+        raise click.UsageError("--suite is of written cases: it does not go with --random")
+    if sumocfg is None and (ego, begin) != (None, None):
+        raise click.UsageError("--ego and --begin go with a SUMOCFG: the built-in scenarios have their own")
     if output is not None:
         make_folder(output)
-    cases = [case for name, cases_of in WRITTEN.items() if suite in (name, "all") for case in cases_of()]
-    beside = _beside() if baselines else ()
-    settings = [Setting(repeats=count, baselines=beside) for count in (None, *([repeats or REPEATS] if jitter else []))]
-    store = None if output is None else Store(output / "scores.jsonl")
-    scores = run_benchmark(cases, settings, jobs, store, _Countdown().score)
+    settings = [Setting(has_controls=wanted is None, baselines=_beside() if baselines else ())]
+    settings += [msgspec.structs.replace(settings[0], repeats=repeats or REPEATS)] if jitter else []
+    store = None if output is None else Store(output / "scores.jsonl", Score)
+    if wanted is None:
+        cases = [case for name, cases_of in WRITTEN.items() if suite in (None, name, "all") for case in cases_of()]
+        scores = run_benchmark(cases, settings, jobs, store, _Countdown().score)
+    else:
+        places = BUILT_IN if sumocfg is None else places_of(sumocfg, ego, begin)
+        drives = None if output is None else Store(output / "healthy.jsonl", HealthyDrive)
+        drawing = Drawing(1 if seed is None else seed, wanted)
+        scores = [one for setting in settings for one in _random_scores(drawing, places, setting, jobs, store, drives)]
     result = json.dumps(json_of(scores), indent=1)
     if output is not None:
         write_whole(output / "benchmark.md", markdown_page(scores))
         write_whole(output / "benchmark.json", result + "\n")
     click.echo(result if as_json else terminal_text(scores))
-    sys.exit(0 if all(check.holds for one in summaries(scores) for check in one.checks) else 1)
+    is_whole = wanted is None or len(scores) == wanted * len(settings)
+    sys.exit(0 if is_whole and all(check.holds for one in summaries(scores) for check in one.checks) else 1)
+
+
+def _random_scores(
+    drawing: Drawing,
+    places: Sequence[Place],
+    setting: Setting,
+    jobs: int,
+    store: Store[Score] | None,
+    drives: Store[HealthyDrive] | None,
+) -> list[Score]:
+    healthy = healthy_drives(places, setting, jobs, drives)
+    for drive in healthy:
+        if drive.complaint:
+            tell(f"left out, not clean without a fault: {drive.place}: {drive.complaint}")
+    clean = [drive for drive in healthy if not drive.complaint]
+    tell(f"{len(clean)} clean drive(s) to plant faults in ({setting.mode} mode)")
+    scores, drawn = random_scores(drawing, clean, setting, jobs, store, _Countdown().score)
+    tell(f"{len(scores)} of {drawn} drawn faults violate")
+    if len(scores) < drawing.wanted:
+        tell(f"drawing stopped: none of the last {PATIENCE} violates; {drawing.wanted} were asked for")
+    return scores
 
 
 def _beside() -> tuple[str, ...]:

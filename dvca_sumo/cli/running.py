@@ -80,7 +80,7 @@ def run(
     output: Path | None,
     as_json: bool,  # noqa: FBT001
 ) -> None:
-    r"""Run a scenario; if a violation occurs, find the component and the message that caused it.
+    """Run a scenario; if a violation occurs, find the component and the message that caused it.
 
     SUMOCFG is any SUMO configuration. The ego is --ego, or the vehicle with the parameter
     dvca.ego=true, or the vehicle with the id "ego". Nothing is written beside the configuration.
@@ -88,7 +88,7 @@ def run(
     \b
     Exit codes: 0 no violation; 1 violation, attributed; 2 usage; 3 bad input;
     4 violation, but unresolved or not reproducible; 70 internal error; 130 interrupted.
-    """
+    """  # noqa: D301 - click wants the very character, not its escape
     if repeats is not None and not jitter:
         raise click.UsageError("--repeats goes with --jitter: in exact mode every run is the same")
     if bug is not None and not StackSource(stack).is_reference:

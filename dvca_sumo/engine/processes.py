@@ -5,6 +5,7 @@ child outlives its parent.
 """
 
 import ctypes
+import itertools
 import multiprocessing
 import os
 import pickle
@@ -13,7 +14,7 @@ import sys
 import tempfile
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -73,21 +74,23 @@ class _Child(Generic[Result]):
 
 
 def isolated(
-    jobs: Sequence[Callable[[], Result]], parallel: int, timeout: float
+    jobs: Iterable[Callable[[], Result]], parallel: int, timeout: float
 ) -> Iterator[tuple[int, Result | Failure]]:
     """Run every job in a process of its own, at most `parallel` at once.
 
-    Yields (row of the job, its result or `Failure`) as they finish. A job that takes longer than
+    Yields (row of the job, its result or `Failure`) as they finish. The next job is taken from `jobs` when
+    there is room for it, so that what was found so far may decide whether there is one. A job that takes longer than
     `timeout` [s] is killed. Leaving the iterator early, by any exception, kills what still runs.
     """
-    waiting = list(enumerate(jobs))[::-1]
+    waiting = enumerate(jobs)
     running: list[_Child[Result]] = []
     with tempfile.TemporaryDirectory(prefix="dvca-sumo-log-") as folder:
         try:
-            while waiting or running:
-                while waiting and len(running) < parallel:
-                    index, job = waiting.pop()
+            while True:
+                for index, job in itertools.islice(waiting, parallel - len(running)):
                     running.append(_Child(index, job, Path(folder) / str(index), timeout))
+                if not running:
+                    return
                 remaining = min(child.deadline for child in running) - time.monotonic()
                 ready = wait([child.receiver for child in running], max(remaining, 0.0))
                 for child in [one for one in running if one.receiver in ready]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 
 from dvca_sumo.scenario.configuration import Configuration, read_configuration, seconds
+from dvca_sumo.scenario.departures import last_departure
 from dvca_sumo.scenario.ego import AUTO, arrival_position, find_ego
 from dvca_sumo.scenario.errors import ScenarioError
 from dvca_sumo.scenario.silence import silenced
@@ -18,6 +19,7 @@ __all__ = [
     "Scenario",
     "ScenarioError",
     "arrival_position",
+    "last_departure",
     "load_scenario",
     "silenced",
 ]

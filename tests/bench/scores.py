@@ -38,6 +38,7 @@ def score(
         simulated_s=40.0,
         factual_wall_s=0.5,
         attribution_wall_s=wall,
+        violation=None if verdict == "none" else "collision",
         verdict=verdict,
         reason="why",
         is_proven=is_proven,

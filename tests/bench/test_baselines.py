@@ -38,7 +38,7 @@ from dvca_sumo.bench.baselines.paper_procedure import algorithm_1
 from dvca_sumo.bench.baselines.procedure import Baseline, Reply, Situation
 from dvca_sumo.bench.baselines.scoring import baseline_scores
 from dvca_sumo.bench.baselines.whole_runs import whole_runs
-from dvca_sumo.bench.cases import Case
+from dvca_sumo.bench.cases import Case, injected_cases
 from dvca_sumo.bench.runs import Setting, analysis_of
 from dvca_sumo.bench.score import BaselineScore, Score
 from dvca_sumo.bench.store import Store
@@ -320,8 +320,8 @@ def test_without_baselines_there_is_no_table_of_them() -> None:
 
 def test_baselines_are_part_of_the_result_and_of_what_is_kept(tmp_path: Path) -> None:
     whole = replace(score(), baselines=beside())
-    Store(tmp_path / "s").add("key", whole)
-    assert Store(tmp_path / "s").find("key") == whole
+    Store(tmp_path / "s", Score).add("key", whole)
+    assert Store(tmp_path / "s", Score).find("key") == whole
     result = json.loads(json.dumps(json_of([whole])))
     assert result["cases"][0]["baselines"]["ddmin"]["component_success"] is None
     assert [one["name"] for one in result["summary"][0]["procedures"]] == ["ours", *beside()]
@@ -339,7 +339,7 @@ def test_what_is_kept_without_baselines_does_not_answer_for_them(
     monkeypatch.setattr(benchmark, "analysed", noting)
     case = Case("injected", "a", "nets/cs1.sumocfg", PERCEPTION, fault="perception.miss")
     for setting in (Setting(), Setting(baselines=("paper",)), Setting(baselines=("paper",))):
-        benchmark.run_benchmark([case], [setting], 1, Store(tmp_path / "s"), lambda _score, _left: None)
+        benchmark.run_benchmark([case], [setting], 1, Store(tmp_path / "s", Score), lambda _score, _left: None)
     assert [setting.baselines for setting in asked if setting.baselines] == [("paper",)]
 
 
@@ -378,9 +378,8 @@ def test_both_modes_have_them(commanded: Callable[..., tuple[list[Setting], str]
     assert [one.mode for one in settings] == ["exact", "jitter"]
 
 
-def test_a_drive_without_violation_leaves_them_nothing_to_explain(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_drive_without_violation_leaves_them_nothing_to_explain() -> None:
     clean = situation(drive([WALKER]))[0].drive
-    monkeypatch.setattr(runs, "_driven", lambda *_words: clean)
     case = Case("injected", "x", "nets/cs1.sumocfg", PERCEPTION, fault="perception.miss")
     setting = Setting(has_controls=False, baselines=tuple(BASELINES))
     found = runs.judged(case, setting, clean, api.attribute(clean), (1.0, 1.0)).baselines
@@ -392,13 +391,7 @@ def test_a_drive_without_violation_leaves_them_nothing_to_explain(monkeypatch: p
 
 
 def test_a_missed_pedestrian_as_each_one_explains_it() -> None:
-    case = Case(
-        "injected",
-        "perception.miss/cs1",
-        "nets/cs1.sumocfg",
-        PERCEPTION,
-        fault="perception.miss:object=pedestrian,start=10.7,end=13.3",
-    )
+    case = next(case for case in injected_cases() if case.name == "perception.miss/cs1")
     names = tuple(one.name for one in available_baselines())
     found = analysis_of(case, Setting(has_controls=False, baselines=names)).baselines
     assert set(found) == set(names)

@@ -35,9 +35,9 @@ def test_it_goes_on_where_it_was_interrupted(tmp_path: Path, monkeypatch: pytest
 
     monkeypatch.setattr(benchmark, "analysed", dying_after_two)
     with pytest.raises(KeyboardInterrupt):
-        run_benchmark(CASES, [Setting()], 1, Store(tmp_path / "s"), ignore)
+        run_benchmark(CASES, [Setting()], 1, Store(tmp_path / "s", Score), ignore)
     asked.clear()
-    found = run_benchmark(CASES, [Setting()], 1, Store(tmp_path / "s"), ignore)
+    found = run_benchmark(CASES, [Setting()], 1, Store(tmp_path / "s", Score), ignore)
     assert asked == ["c"]
     assert [one.name for one in found] == ["a", "b", "c"]
 
@@ -50,7 +50,7 @@ def test_a_case_that_failed_is_tried_again(tmp_path: Path, monkeypatch: pytest.M
 
     monkeypatch.setattr(benchmark, "analysed", failing_once)
     for expected in (FAILED, "component"):
-        (found,) = run_benchmark(CASES[:1], [Setting()], 1, Store(tmp_path / "s"), ignore)
+        (found,) = run_benchmark(CASES[:1], [Setting()], 1, Store(tmp_path / "s", Score), ignore)
         assert found.verdict == expected
 
 
@@ -64,7 +64,7 @@ def test_other_seeds_and_modes_are_other_questions(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(benchmark, "analysed", noting)
     settings = [Setting(), Setting(seed=2), Setting(repeats=3)]
     for _ in range(2):
-        assert len(run_benchmark(CASES[:1], settings, 1, Store(tmp_path / "s"), ignore)) == 3
+        assert len(run_benchmark(CASES[:1], settings, 1, Store(tmp_path / "s", Score), ignore)) == 3
     assert asked == settings
 
 

@@ -5,39 +5,40 @@ from pathlib import Path
 import pytest
 
 from bench.scores import score
+from dvca_sumo.bench.score import Score
 from dvca_sumo.bench.store import Store, StoreError, key_of
 
 
 def test_what_was_added_is_found_by_the_next_one(tmp_path: Path) -> None:
-    Store(tmp_path / "deep" / "scores.jsonl").add("a", score())
-    again = Store(tmp_path / "deep" / "scores.jsonl")
+    Store(tmp_path / "deep" / "scores.jsonl", Score).add("a", score())
+    again = Store(tmp_path / "deep" / "scores.jsonl", Score)
     assert again.find("a") == score()
     assert again.find("b") is None
 
 
 def test_a_line_that_was_cut_off_is_forgotten_and_the_rest_kept(tmp_path: Path) -> None:
     path = tmp_path / "scores.jsonl"
-    store = Store(path)
+    store = Store(path, Score)
     store.add("a", score())
     store.add("b", score("other"))
     path.write_bytes(path.read_bytes()[:-20])
-    again = Store(path)
+    again = Store(path, Score)
     assert again.find("a") == score()
     assert again.find("b") is None
     again.add("b", score("other"))
-    assert Store(path).find("b") == score("other")
+    assert Store(path, Score).find("b") == score("other")
 
 
 def test_a_file_of_something_else_is_named_with_its_line(tmp_path: Path) -> None:
     (tmp_path / "scores.jsonl").write_text('{"key": 1}\n')
-    with pytest.raises(StoreError, match=r"line 1 of .*scores\.jsonl is no score"):
-        Store(tmp_path / "scores.jsonl")
+    with pytest.raises(StoreError, match=r"line 1 of .*scores\.jsonl is no Score"):
+        Store(tmp_path / "scores.jsonl", Score)
 
 
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(StoreError, match="results cannot be kept in"):
-        Store(tmp_path / "file" / "scores.jsonl")
+        Store(tmp_path / "file" / "scores.jsonl", Score)
 
 
 def test_equal_questions_have_equal_keys_and_others_others() -> None:

@@ -54,6 +54,19 @@ def test_every_job_gives_its_answer_under_its_own_row() -> None:
     assert dict(isolated(jobs, 3, LONG)) == {number: number * number for number in range(7)}
 
 
+def test_jobs_may_depend_on_what_was_found_before() -> None:
+    found: list[int] = []
+
+    def jobs() -> Iterator[Callable[[], int]]:
+        while len(found) < 3:
+            yield lambda: 10 * len(found)
+
+    for _, answer in isolated(jobs(), 1, LONG):
+        assert isinstance(answer, int)
+        found.append(answer)
+    assert found == [0, 10, 20]
+
+
 def test_no_jobs_are_no_answers() -> None:
     assert answers([]) == []
 
