@@ -65,6 +65,7 @@ GROWN = 0.1  # [s] by which the narrowest window is grown at either end
 HARMLESS_EVERY = 2.0  # [s] between the moments tried
 ENOUGH = 0.5  # of the messages that the harmful one alters
 PATIENCE = 8.0  # [s] after the meeting: who has not met the hazard by then will not
+AFTER_CONTACT = (0.1, 0.5, 1.0, 2.0, 4.0)  # [s] where the window may end at first
 ROUNDS = 6
 SETTLE = 7.0  # [s] after the first violation: a close call within it belongs to the contact
 
@@ -169,8 +170,13 @@ class Ground:
             raise SystemExit(f"{name} violates without a fault: {healthy.violations[0].detail}")
         self._futures = recorded_futures(healthy.moments)
         self._departed, self._end = healthy.start, healthy.path[-1].time
-        self.is_strict = True  # the violation to be explained must be the contact itself
+        self._is_strict = True
         self._known: dict[str, Sequence[Violation]] = {}  # by fault
+
+    def judge(self, *, is_strict: bool) -> None:
+        """From now on: whether the violation to be explained must be the contact itself."""
+        self._is_strict = is_strict
+        self._known.clear()
 
     def close(self) -> None:
         """End what is parked."""
@@ -234,7 +240,7 @@ class Ground:
     def _contact(self, violations: Sequence[Violation]) -> float | None:
         if not violations:
             return None
-        last = principal(violations) if self.is_strict else violations[-1]  # nothing is judged after a contact
+        last = principal(violations) if self._is_strict else violations[-1]  # nothing is judged after a contact
         name = (last.object or "").rpartition(":")[2]
         is_meant = last.contact is not None and name.startswith(self.hazard.objects)
         return last.time - self._departed if is_meant else None
@@ -249,10 +255,10 @@ def _drive(scenario: Scenario, fault: str, stop: StopRule) -> tuple[list[Violati
 def searched(ground: Ground, fault: str) -> Case:
     """One instance."""
     name = f"{fault}/{ground.name}"
-    ground.is_strict = True
+    ground.judge(is_strict=True)
     trial = first(ground, fault)
     if trial is None:
-        ground.is_strict = False
+        ground.judge(is_strict=False)
         trial = first(ground, fault)
     if trial is None:
         raise NotFoundError(f"{name}: no magnitude in any window leads to the contact")
@@ -346,9 +352,16 @@ def _later(ground: Ground, trial: Trial) -> Trial:
 
 
 def _shorter(ground: Ground, trial: Trial) -> Trial:
-    contact = _time_of_contact(ground, trial)
-    end = _steps(contact) + 1 if trial.end > contact else _steps(trial.end)  # past the contact nothing matters
-    return _least(ground, lambda count: msgspec.structs.replace(trial, end=_grid(count)), _steps(trial.start), end)
+    def at(count: int) -> Trial:
+        return msgspec.structs.replace(trial, end=_grid(count))
+
+    contact = _steps(_time_of_contact(ground, trial))
+    if trial.end <= _grid(contact + 1):
+        return _least(ground, at, _steps(trial.start), _steps(trial.end))
+    for later in AFTER_CONTACT:  # what is ideal beside the fault may put the contact off
+        if ground.contacts([at(contact + _steps(later))]) != [None]:
+            return _least(ground, at, _steps(trial.start), contact + _steps(later))
+    return trial
 
 
 def _time_of_contact(ground: Ground, trial: Trial) -> float:
