@@ -1,14 +1,15 @@
 """Idealized substitutes in a drive: each repairs its own component and no other one's fault."""
 
 import math
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from small_scenarios import driven, scenario_file
 
-from dvca_sumo.geometry.randomness import key_of
-from dvca_sumo.interventions import Futures, Ideal, Track, planted_fault, recorded_futures
+from dvca_sumo.geometry.frames import transferred
+from dvca_sumo.interventions import Futures, Ideal, Selection, Track, planted_fault, recorded_futures
 from dvca_sumo.messages import (
     PREDICTION_TIMES,
     Component,
@@ -83,11 +84,50 @@ def test_ideal_perception_places_objects_through_the_believed_pose(config: Path)
     tick, message = messages(record, Component.PERCEPTION)[20]
     assert isinstance(message, TrackedObjects)
     truth, believed = record.moment_at(tick), record.believed_at(tick)
-    row = message.ids.tolist().index(key_of("oncoming"))
+    row = row_of(message, record, tick, "oncoming")
     seen, real = message.boxes[row], truth.objects.boxes[truth.objects.ids.index("oncoming")]
     assert seen[1] - real[1] == pytest.approx(1.0, abs=0.4)
     ahead = math.hypot(seen[0] - believed.x, seen[1] - believed.y)
     assert ahead == pytest.approx(math.hypot(real[0] - truth.ego.x, real[1] - truth.ego.y))
+
+
+def row_of(told: TrackedObjects, record: Record, tick: int, name: str) -> int:
+    """Row of the object that stands where `name` truly is, as the ego believes to stand."""
+    truth, believed = record.moment_at(tick), record.believed_at(tick)
+    box = truth.objects.boxes[[truth.objects.ids.index(name)], :3]
+    here = (truth.ego.x, truth.ego.y, truth.ego.heading)
+    place = transferred(box, here, (believed.x, believed.y, believed.heading))[0]
+    away = np.hypot(*(told.boxes[:, :2] - place[:2]).T)
+    assert away.min() < 0.01
+    return int(away.argmin())
+
+
+def test_ideal_perception_goes_on_under_the_ids_that_perception_gave_and_keeps_them(config: Path) -> None:
+    at = 20
+    record = driven(config, Ideal(Component.PERCEPTION, Selection(first=at)))
+    (_, before), *after = messages(record, Component.PERCEPTION)[at - 1 : at + 15]
+    assert isinstance(before, TrackedObjects)
+    for tick, message in after:
+        assert isinstance(message, TrackedObjects)
+        row = row_of(message, record, tick, "oncoming")
+        assert message.ids[row] in before.ids
+
+
+def test_ideal_perception_and_ideal_prediction_call_an_object_the_same(config: Path) -> None:
+    record = driven(config, Ideal(Component.PERCEPTION), Ideal(Component.PREDICTION))
+    for (_, seen), (_, told) in zip(
+        messages(record, Component.PERCEPTION), messages(record, Component.PREDICTION), strict=True
+    ):
+        assert isinstance(seen, TrackedObjects)
+        assert isinstance(told, PredictedObjects)
+        assert seen.ids.tolist() == told.objects.ids.tolist()
+
+
+def test_ideal_control_takes_over_without_a_jump_of_speed(config: Path) -> None:
+    faster = planted_fault("control.longitudinal:error=3,start=0.5,end=2")
+    record = driven(config, faster, Ideal(Component.CONTROL, Selection(start=2.0)))
+    speeds = [truth.speed for truth in record.path[150:400]]
+    assert max(abs(one - other) for one, other in pairwise(speeds)) <= 0.09 + 1e-9
 
 
 def test_ideal_perception_hides_nothing_in_range(tmp_path: Path, street: Path) -> None:
@@ -99,7 +139,7 @@ def test_ideal_perception_hides_nothing_in_range(tmp_path: Path, street: Path) -
         truth = ideal.moment_at(tick)
         gaps = np.hypot(truth.objects.boxes[:, 0] - truth.ego.x, truth.objects.boxes[:, 1] - truth.ego.y)
         near = [name for name, gap in zip(truth.objects.ids, gaps, strict=True) if gap < ideal.sensor_range]
-        assert message.ids.tolist() == [key_of(name) for name in near]
+        assert len(message.ids) == len(set(message.ids.tolist())) == len(near)
     _, first = messages(ideal, Component.PERCEPTION)[10]
     _, sensed = messages(real, Component.PERCEPTION)[10]
     assert isinstance(first, TrackedObjects)
@@ -147,9 +187,10 @@ def test_ideal_prediction_answers_with_recorded_futures(config: Path) -> None:
     track = Track(times, np.column_stack([400.0 - 3.0 * times, 5.0 + times, np.full(len(times), 2.0)]), ("cb_0",) * 200)
     ideals = (Ideal(Component.LOCALIZATION), Ideal(Component.PREDICTION))
     record = driven(config, *ideals, futures=Futures({"oncoming": track}))
-    for _, message in messages(record, Component.PREDICTION):
+    for tick, message in messages(record, Component.PREDICTION):
         assert isinstance(message, PredictedObjects)
-        for row in np.flatnonzero(message.objects.ids == key_of("oncoming")):
+        if len(message.objects.ids):  # it is in range
+            row = row_of(message.objects, record, tick, "oncoming")
             (hypothesis,) = np.flatnonzero(message.owners == row)
             wanted = message.time + PREDICTION_TIMES
             assert message.poses[hypothesis, :, 0] == pytest.approx(400.0 - 3.0 * wanted, abs=1e-6)
@@ -161,9 +202,9 @@ def test_futures_of_the_factual_run_come_true_for_those_who_do_not_react(config:
     futures = recorded_futures(driven(config).moments)
     record = driven(config, Ideal(Component.LOCALIZATION), Ideal(Component.PREDICTION), futures=futures)
     real = recorded_futures(record.moments).tracks["oncoming"]
-    _, message = messages(record, Component.PREDICTION)[5]
+    tick, message = messages(record, Component.PREDICTION)[5]
     assert isinstance(message, PredictedObjects)
-    row = message.objects.ids.tolist().index(key_of("oncoming"))
+    row = row_of(message.objects, record, tick, "oncoming")
     (hypothesis,) = np.flatnonzero(message.owners == row)
     wanted = message.time + PREDICTION_TIMES[:13]
     for column in (0, 1):
