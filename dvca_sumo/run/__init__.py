@@ -24,6 +24,7 @@ __all__ = [
     "Simulation",
     "StopRule",
     "Task",
+    "built_here",
     "departed",
     "free_flow",
     "opened",

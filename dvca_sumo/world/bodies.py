@@ -71,7 +71,8 @@ class Native:
 
     def follow(self, time: float, motion: Motion) -> None:
         """Take over how it moves at `time` [s]."""
-        self.truth = self._seen(time, motion, self.truth.heading, time - self.truth.time)
+        if time > self.truth.time:
+            self.truth = self._seen(time, motion, self.truth.heading, time - self.truth.time)
 
     def _seen(self, time: float, motion: Motion, before: float, passed: float) -> EgoTruth:
         front, heading = self.shape.front, motion.heading
