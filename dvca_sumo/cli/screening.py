@@ -18,7 +18,7 @@ from dvca_sumo.screen.trips import Draw
 from dvca_sumo.stack.sources import StackSource
 from dvca_sumo.store import Store
 
-_PAUSE = 10.0  # [s] of wall time between two words of one simulation
+_PAUSE = 30.0  # [s] of wall time between two words of one simulation
 
 
 class _Terminal(Progress):

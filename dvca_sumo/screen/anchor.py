@@ -1,6 +1,8 @@
 """The same trips driven by SUMO's own drivers, in one run without any ADS, before the same oracles.
 
-The mission's destination is not asked of them: SUMO takes its vehicles away at speed, where they arrive.
+Two things differ from an ego's drive. The destination is not asked of them: SUMO takes its vehicles away at speed,
+where they arrive. And they go on after a contact, which to SUMO may be none; but as an ego's drive, theirs is not
+judged any more.
 """
 
 from collections.abc import Sequence
@@ -70,6 +72,7 @@ class _Ride:
         self._oracles = [oracle for oracle in judging.oracles if oracle.kind != Destination.kind]
         self._watch = Watch(entry.ego, judging, roads)
         self._latest = departing.latest(entry, route)
+        self._is_judged = True
 
     def step(self, world: World, *, is_gone: bool) -> TripResult | None:
         """Look at it at this world step; its result when it is over."""
@@ -79,8 +82,9 @@ class _Ride:
             return self._result(Outcome.ABORTED, f"SUMO teleported it or changed its route at {world.time:g} s")
         moment = world.observe(self.native)
         self._watch.see(moment)
-        if self._has_touched(moment):
-            return self._result(Outcome.CONTACT)
+        if self._is_judged and self._has_touched(moment):
+            self._is_judged = False
+            self._watch.touch(moment)
         return self._result(Outcome.TIME_OVER) if moment.time >= self._latest else None
 
     def cut(self) -> TripResult:
@@ -92,5 +96,6 @@ class _Ride:
         return any(one is not None and one.contact is not None for one in found)
 
     def _result(self, outcome: Outcome, reason: str = "") -> TripResult:
-        ending = {Outcome.ARRIVED: Ending.ARRIVED, Outcome.TIME_OVER: Ending.TIME_OVER}.get(outcome, Ending.CUT)
+        endings = {Outcome.ARRIVED: Ending.ARRIVED, Outcome.TIME_OVER: Ending.TIME_OVER}
+        ending = endings.get(outcome, Ending.CUT) if self._is_judged else Ending.CUT
         return self._watch.result(outcome, tuple(oracle.conclude(ending) for oracle in self._oracles), reason)

@@ -45,12 +45,12 @@ class Judged(msgspec.Struct, frozen=True):
 
 
 def judged(
-    judgements: Sequence[Judgement], disturbances: Disturbances, last: Moment, roadmap: RoadMap
+    judgements: Sequence[Judgement], disturbances: Disturbances, end: Moment, roadmap: RoadMap
 ) -> tuple[Judged, ...]:
-    """All violations of a drive by time, `last` being its last moment, which is that of its contact if it has one."""
+    """All violations of a drive by time, `end` being its last moment that was judged: its contact, if it has one."""
     violations = [(judgement.kind, violation) for judgement in judgements for violation in judgement.violations]
     contact = next((one for _, one in violations if one.contact is not None), None)
-    excuse = "" if contact is None else _excuse(contact, last, roadmap)
+    excuse = "" if contact is None else _excuse(contact, end, roadmap)
     found = []
     for oracle, violation in violations:
         disturbance = disturbances.explain(violation.object, violation.time)

@@ -48,10 +48,16 @@ class Watch:
         self._measures = Measures(judging.places, judging.thresholds)
         self._disturbances = Disturbances(judging.places)
 
+        self._contact: Moment | None = None
+
     def see(self, moment: Moment) -> None:
         """Take in the next moment."""
         self._measures.see(moment)
         self._disturbances.see(moment)
+
+    def touch(self, moment: Moment) -> None:
+        """Take in the moment of the contact, of a drive that goes on after it."""
+        self._contact = moment
 
     def result(
         self, outcome: Outcome, judgements: tuple[Judgement, ...], reason: str = "", digest: str = ""
@@ -68,7 +74,7 @@ class Watch:
             duration=round(measures.duration, 3),
             hard_brakings=measures.hard_brakings,
             least_ttc=measures.least_ttc,
-            violations=judged(judgements, self._disturbances, last, self._roadmap),
+            violations=judged(judgements, self._disturbances, self._contact or last, self._roadmap),
             unknown=tuple(one.kind for one in judgements if one.answer == "unknown"),
             digest=digest,
         )

@@ -64,7 +64,7 @@ def screened(setting: Setting, jobs: int, stores: "Stores", progress: Progress) 
         RunFailedError: SUMO crashed or hung without any ADS.
     """
     roads = roadmap(setting.scenario.configuration.net, "passenger")  # before any process starts: it is shared
-    if not any(lane.is_drivable and not lane.is_crossing for lane in roads.lanes.values()):
+    if not any(lane.is_drivable and not lane.is_internal for lane in roads.lanes.values()):
         raise ScenarioError(f"{setting.scenario.configuration.net} has no lane for cars (rails, water or paths only)")
     stack_factory(setting.source)
     return _Work(setting, jobs, stores, progress).screening()
