@@ -1,8 +1,8 @@
 """The same trips driven by SUMO's own drivers, in one run without any ADS, before the same oracles.
 
-Two things differ from an ego's drive. The destination is not asked of them: SUMO takes its vehicles away at speed,
-where they arrive. And they go on after a contact, which to SUMO may be none; but as an ego's drive, theirs is not
-judged any more.
+Three things differ from an ego's drive. The destination is not asked of them: SUMO takes its vehicles away at speed,
+where they arrive. They go on after a contact, which to SUMO may be none; but as an ego's drive, theirs is not judged
+any more. And they have more patience, so that their travel times are known.
 """
 
 from collections.abc import Sequence
@@ -20,6 +20,8 @@ from dvca_sumo.stack.reference import reference_stack
 from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Ending
 from dvca_sumo.world import Entry, Native, World
+
+_PATIENCE = 3600.0  # [s] for one trip
 
 
 def anchored(scenario: Scenario, trips: Sequence[Trip], hear: Heard) -> Driven:
@@ -71,7 +73,7 @@ class _Ride:
         self.native: Native = world.watch(entry, route)
         self._oracles = [oracle for oracle in judging.oracles if oracle.kind != Destination.kind]
         self._watch = Watch(entry.ego, judging, roads)
-        self._latest = departing.latest(entry, route)
+        self._latest = entry.time + _PATIENCE
         self._is_judged = True
 
     def step(self, world: World, *, is_gone: bool) -> TripResult | None:

@@ -4,7 +4,7 @@
 2. The other one's: it ran into the standing ego; it ran into the ego from behind while the ego was in its lane; it
    touched the flank of an ego that was in its lane and not on a junction. Then time to collision and distance to that
    same object just before are its doing, too.
-3. Everything else is the driver's: the ego's own. Traffic rules and missions are always the driver's.
+3. Everything else is the driver's: the ego's own. Traffic rules are always the driver's.
 
 The ego is in its lane when no corner of its body is more than 0.3 m beyond the edges of the lane under its middle.
 """
@@ -41,7 +41,7 @@ class Judged(msgspec.Struct, frozen=True):
     violation: Violation
     fault: Fault
     reason: str  # why it is not the driver's; empty if it is
-    is_alone: bool | None = None  # whether it also occurs with no other ego in the simulation; None: not asked
+    is_alone: bool | None = None  # whether it also occurs with no other ego in the simulation; None: not known
 
 
 def judged(

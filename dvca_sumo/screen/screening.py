@@ -8,11 +8,12 @@ import msgspec
 
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.engine.replay import raised, roadmap
+from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.report.result import versions
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.screen.anchor import anchored
 from dvca_sumo.screen.driving import Driven, Heard, driven, planned
-from dvca_sumo.screen.judging import Judged
+from dvca_sumo.screen.judging import Fault, Judged
 from dvca_sumo.screen.results import Outcome, TripResult
 from dvca_sumo.screen.trips import Draw, Trip, drawn
 from dvca_sumo.stack.sources import StackSource, stack_factory
@@ -96,11 +97,12 @@ class _Work:
             raise raised(anchor)
         results = self._whole(batches, answers)
         alone = self._alone(batches, results)
+        natives = {result.ego: result for result in anchor.results}
         return Screening(
             self._setting,
             draw,
-            tuple(_marked(results[ego], alone.get(ego)) for ego in self._trips),
-            tuple(sorted(anchor.results, key=lambda result: list(self._trips).index(result.ego))),
+            tuple(_marked(excused(results[ego], natives[ego]), alone.get(ego)) for ego in self._trips),
+            tuple(natives[ego] for ego in self._trips),
         )
 
     def _draw(self) -> Draw:
@@ -194,6 +196,18 @@ def _key(setting: Setting, *question: object) -> str:
     stamps = [(str(path), path.stat().st_size, path.stat().st_mtime_ns) for path in files]
     asked = (scenario.seed, scenario.begin, scenario.end, setting.source, versions())
     return key_of([scenario.arguments, stamps, asked, question])
+
+
+def excused(result: TripResult, native: TripResult) -> TripResult:
+    """The result, its destination excused where SUMO's driver was held up as long."""
+    if result.outcome is not Outcome.TIME_OVER or native.duration <= result.duration:
+        return result
+    reason = f"SUMO's driver had not arrived after {result.duration:.0f} s either"
+    violations = tuple(
+        msgspec.structs.replace(one, fault=Fault.OTHER, reason=reason) if one.oracle == Destination.kind else one
+        for one in result.violations
+    )
+    return msgspec.structs.replace(result, violations=violations)
 
 
 def _marked(result: TripResult, alone: TripResult | None) -> TripResult:

@@ -13,7 +13,7 @@ from dvca_sumo.screen.screening import Screening, Setting
 from dvca_sumo.screen.summary import DriverSummary, Quartiles, summary_of
 
 SCHEMA = 1
-_ALONE = {True: "yes", False: "no", None: "not asked"}
+_ALONE = {True: "yes", False: "no", None: "not known"}
 
 
 def json_of(screening: Screening) -> Json:

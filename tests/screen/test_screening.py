@@ -10,12 +10,15 @@ from screen_scenes import traffic
 
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.screen.driving import Driven
-from dvca_sumo.screen.screening import Progress, Screening, Setting, Stores, screened
+from dvca_sumo.screen.judging import Fault, Judged
+from dvca_sumo.screen.results import Outcome, TripResult
+from dvca_sumo.screen.screening import Progress, Screening, Setting, Stores, excused, screened
 from dvca_sumo.screen.summary import summary_of
 from dvca_sumo.screen.tables import has_failed, has_gaps, json_of, terminal_text
 from dvca_sumo.screen.trips import Draw
 from dvca_sumo.stack.sources import StackSource
 from dvca_sumo.store import Store
+from dvca_sumo.violations import Category, Violation
 
 ROUTES = """<vType id="bus" vClass="bus"/>
 <trip id="first" from="ab" to="bc" depart="1" departPos="last"/>
@@ -128,3 +131,19 @@ def test_what_cannot_be_meant_is_refused(
 ) -> None:
     scenario = traffic(tmp_path, street, ROUTES)
     assert_one_error(typed("screen", scenario.configuration.path, *words), code, says)
+
+
+def test_a_destination_is_excused_only_where_sumos_driver_was_held_up_as_long(reckless: Screening) -> None:
+    destination = Violation(
+        "destination_not_reached", Category.MISSION, 99.0, None, (0.0, 0.0), None, 40.0, 3.0, "40.0 m short"
+    )
+    late = TripResult(
+        "ego",
+        Outcome.TIME_OVER,
+        duration=100.0,
+        violations=(Judged("destination", destination, Fault.DRIVER, ""),),
+    )
+    for taken, fault in ((99.0, Fault.DRIVER), (101.0, Fault.OTHER)):
+        native = TripResult("ego", Outcome.ARRIVED, duration=taken)
+        assert [one.fault for one in excused(late, native).violations] == [fault]
+    assert all(result == excused(result, result) for result in reckless.ads)
