@@ -47,8 +47,9 @@ class _Terminal(Progress):
                 started = said = wall
             if wall - said >= _PAUSE:
                 said = wall
-                left = (wall - started) / max(now - begin, 1.0) * max(end - now, 0.0)
-                words = f"  simulation {number}: {now:.0f} s, {done} of {trips} trips over, about {left:.0f} s left\n"
+                left = (wall - started) / max(now - begin, 1.0) * (end - now)
+                hope = f"about {left:.0f} s left" if left > 0.0 else "held up"
+                words = f"  simulation {number}: {now:.0f} s, {done} of {trips} trips over, {hope}\n"
                 os.write(self._descriptor, words.encode())
 
         return hear

@@ -21,7 +21,7 @@ from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Ending
 from dvca_sumo.world import Entry, Native, World
 
-_PATIENCE = 3600.0  # [s] for one trip
+_PATIENCE = 1200.0  # [s] for one trip: some scenarios jam for ever
 
 
 def anchored(scenario: Scenario, trips: Sequence[Trip], hear: Heard) -> Driven:
