@@ -1,7 +1,7 @@
 """A screening as data and as text."""
 
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import msgspec
 
@@ -126,12 +126,18 @@ def _line(trip: TripResult, one: Judged, setting: Setting) -> str:
 def _by_oracle(ads: DriverSummary, sumo: DriverSummary) -> list[list[str]]:
     rows = []
     for kind in ads.by_oracle:
-        row = [kind]
+        row = [_named(kind, ads.by_oracle[kind].kinds.keys() | sumo.by_oracle[kind].kinds.keys())]
         for one in (ads.by_oracle[kind], sumo.by_oracle[kind]):
             others, simulator = one.by_fault["other"], one.by_fault["simulator"]
             row += [_rate(one.per_1000_km, 0), _rate(one.per_100_trips, 1), f"({others}, {simulator})"]
         rows.append(row)
     return rows
+
+
+def _named(oracle: str, kinds: Collection[str]) -> str:
+    """An oracle with those of its kinds that have other names."""
+    others = sorted(set(kinds) - {oracle})
+    return f"{oracle} (with {', '.join(others)})" if others else oracle
 
 
 def _share(share: Share) -> str:
