@@ -14,10 +14,9 @@ from dvca_sumo.analysis.violating import is_same_family
 from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.frames import relative, transferred
 from dvca_sumo.messages import ACCELERATION, CURVATURE, HEADING, SPEED, Component, MessageId, Trajectory, X, Y
-from dvca_sumo.oracles import judge, judges
+from dvca_sumo.oracles import Places, judge, judges
 from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.oracles.no_progress import NoProgress
-from dvca_sumo.oracles.place import Places
 from dvca_sumo.record import MessageMark, Record
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.thresholds import Thresholds
@@ -91,7 +90,7 @@ def _breach(
     record: Record, roadmap: RoadMap, thresholds: Thresholds, trajectory: Trajectory, tick: int, violation: Violation
 ) -> str:
     moments = _driven(record, trajectory, tick)
-    for judgement in judge(moments, judges(record.route, thresholds, roadmap), Ending.CUT):
+    for judgement in judge(moments, judges(Places(record.route, roadmap), thresholds), Ending.CUT):
         for found in judgement.violations:
             if is_same_family(found.kind, violation) and found.object == violation.object:
                 return f"driven as planned it leads to {found.kind} in {found.time - moments[0].time:.1f} s"

@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 from dvca_sumo.bench.cases import Case
 from dvca_sumo.bench.runs import Setting, analysed
 from dvca_sumo.bench.score import FAILED, Score
-from dvca_sumo.bench.store import Store, key_of
 from dvca_sumo.report.result import versions
+from dvca_sumo.store import Store, key_of
 
 OnScore = Callable[[Score, int], None]  # a case's score, and how many are left
 

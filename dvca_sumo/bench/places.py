@@ -10,11 +10,11 @@ import numpy as np
 
 from dvca_sumo import api
 from dvca_sumo.bench.runs import TIMEOUT, Setting, driven
-from dvca_sumo.bench.store import Store, key_of
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.record import Record
 from dvca_sumo.report.result import versions
 from dvca_sumo.scenario import AUTO, Scenario, ScenarioError, last_departure
+from dvca_sumo.store import Store, key_of
 from dvca_sumo.violations import Answer, Ending
 
 _BEGINS = 12  # of a scenario that names no ego

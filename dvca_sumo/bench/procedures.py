@@ -7,7 +7,7 @@ import msgspec
 
 from dvca_sumo.bench.baselines import BASELINES
 from dvca_sumo.bench.score import BaselineScore, Score
-from dvca_sumo.bench.share import Share, share_of
+from dvca_sumo.intervals import Share, share_of
 
 _OURS = "ours"
 

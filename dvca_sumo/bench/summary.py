@@ -8,7 +8,7 @@ import msgspec
 
 from dvca_sumo.bench.procedures import ProcedureSummary, procedures_of
 from dvca_sumo.bench.score import FAILED, Score
-from dvca_sumo.bench.share import Share, share_of
+from dvca_sumo.intervals import Share, share_of
 
 # What has to hold for an analysis to be trusted; shares of cases.
 _COMPONENTS, _MESSAGES = 1.0, 1.0  # of the written suites in exact mode

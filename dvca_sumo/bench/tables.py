@@ -7,8 +7,8 @@ import msgspec
 from dvca_sumo.bench.paper import BY_SUITE, Figures
 from dvca_sumo.bench.procedures import ProcedureSummary
 from dvca_sumo.bench.score import FAILED, Score
-from dvca_sumo.bench.share import Share
 from dvca_sumo.bench.summary import Summary, summary_of
+from dvca_sumo.intervals import Share
 from dvca_sumo.messages import COMPONENTS
 from dvca_sumo.report.result import Json, versions
 

@@ -7,17 +7,18 @@ from typing import NoReturn
 import click
 
 from dvca_sumo.bench.cases import CasesError
-from dvca_sumo.bench.store import StoreError
 from dvca_sumo.cli.benching import bench
 from dvca_sumo.cli.listing import faults
 from dvca_sumo.cli.output import ExitCode, tell
 from dvca_sumo.cli.running import run
+from dvca_sumo.cli.screening import screen
 from dvca_sumo.engine.protocol import RunFailedError
 from dvca_sumo.interventions import FaultError
 from dvca_sumo.roadmap import RoadMapError
 from dvca_sumo.scenario import ScenarioError
 from dvca_sumo.stack.bugs import BugError
 from dvca_sumo.stack.reference import StackError
+from dvca_sumo.store import StoreError
 
 __all__ = ["ExitCode", "main"]
 
@@ -28,7 +29,7 @@ def program() -> None:
     """Find which component of an automated driving system caused a violation, and which message to open first."""
 
 
-for command in (run, faults, bench):
+for command in (run, screen, faults, bench):
     program.add_command(command)
 
 

@@ -17,10 +17,10 @@ from dvca_sumo.bench.places import BUILT_IN, HealthyDrive, Place, healthy_drives
 from dvca_sumo.bench.random_faults import PATIENCE, Drawing, random_scores
 from dvca_sumo.bench.runs import Setting
 from dvca_sumo.bench.score import Score
-from dvca_sumo.bench.store import Store
 from dvca_sumo.bench.tables import json_of, markdown_page, summaries, terminal_text
 from dvca_sumo.cli.output import make_folder, tell, write_whole
 from dvca_sumo.cli.running import REPEATS
+from dvca_sumo.store import Store
 
 
 class _Countdown:

@@ -12,12 +12,11 @@ from dvca_sumo.oracles.road_departure import RoadDeparture
 from dvca_sumo.oracles.speed_limit import SpeedLimit
 from dvca_sumo.oracles.stop_line import StopAtLine
 from dvca_sumo.oracles.ttc import TimeToCollision
-from dvca_sumo.roadmap import RoadMap, Route
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Ending, Judgement
 
-__all__ = ["ORACLES", "Oracle", "judge", "judges"]
+__all__ = ["ORACLES", "Oracle", "Places", "judge", "judges"]
 
 ORACLES: tuple[type[Oracle], ...] = (
     Collision,
@@ -31,9 +30,8 @@ ORACLES: tuple[type[Oracle], ...] = (
 )
 
 
-def judges(route: Route, thresholds: Thresholds, roadmap: RoadMap) -> tuple[Oracle, ...]:
-    """All oracles for one run of one ego along `route`, at its beginning."""
-    places = Places(route, roadmap)
+def judges(places: Places, thresholds: Thresholds) -> tuple[Oracle, ...]:
+    """All oracles for one run of one ego along the route of `places`, at its beginning."""
     return tuple(oracle(places, thresholds) for oracle in ORACLES)
 
 

@@ -15,6 +15,8 @@ class Oracle(Protocol):
     to the same answers. An oracle sees the truth and never the simulator, so it cannot disturb a run.
     """
 
+    kind: str
+
     def __init__(self, places: Places, thresholds: Thresholds) -> None:
         """An oracle at the beginning of a run; oracles of one run may share `places`."""
         ...

@@ -51,13 +51,13 @@ def result_of(
         },
         "faults": [_fault(fault) for fault in faults],
         "bug": bug,
-        "violations": [_violation(violation) for violation in record.violations],
+        "violations": [violation_json(violation) for violation in record.violations],
         "judgements": [
             {"kind": one.kind, "answer": one.answer.value, "reason": one.reason} for one in record.judgements
         ],
         "verdict": found.verdict.value,
         "reason": found.reason,
-        "violation": None if found.violation is None else _violation(found.violation),
+        "violation": None if found.violation is None else violation_json(found.violation),
         "component": _component(found),
         "alternatives": [] if found.components is None else [one.value for one in found.components.alternatives],
         "substitutions": _substitutions(found),
@@ -102,7 +102,8 @@ def _fault(fault: Fault) -> Json:
     }
 
 
-def _violation(violation: Violation) -> Json:
+def violation_json(violation: Violation) -> Json:
+    """One violation, of JSON types only."""
     return {
         "kind": violation.kind,
         "category": violation.category.value,
@@ -172,7 +173,7 @@ def _probe(probe: Probe) -> Json:
         "ideal": [component.value for component in probe.question.ideal],
         "from": None if since is None else _mark(since),
         "outcome": probe.outcome.value,
-        "violation": None if probe.violation is None else _violation(probe.violation),
+        "violation": None if probe.violation is None else violation_json(probe.violation),
         "reason": probe.reason,
         "jitter": probe.jitter,
         "passes": probe.passes,

@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple, TypeVar
 
+import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.randomness import uniforms
@@ -19,7 +20,7 @@ from dvca_sumo.messages import (
     TrackedObjects,
     Trajectory,
 )
-from dvca_sumo.oracles import Oracle
+from dvca_sumo.oracles import Oracle, Places
 from dvca_sumo.oracles.no_progress import NoProgress
 from dvca_sumo.record import TICK, Digest, Execution, Record, moved_on
 from dvca_sumo.run.task import Task
@@ -27,7 +28,7 @@ from dvca_sumo.stack.ideal import SUBSTITUTES
 from dvca_sumo.stack.reference import Stack, StackError
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import EgoTruth, Moment
-from dvca_sumo.violations import Ending, Violation
+from dvca_sumo.violations import Ending, Judgement, Violation
 from dvca_sumo.world import ControlCommandError, Ego
 
 TICKS_PER_STEP = 10
@@ -55,14 +56,31 @@ class Judging(NamedTuple):
 
     oracles: tuple[Oracle, ...]
     thresholds: Thresholds
+    places: Places  # that the oracles share
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """How a drive came out."""
+
+    violations: tuple[Violation, ...]  # by time, up to the first contact
+    judgements: tuple[Judgement, ...]
+    ending: Ending
+    digest: str  # of the whole run, as its record's
 
 
 class Drive:
     """One ego's drive, advanced by one world step at a time."""
 
-    def __init__(self, ego: Ego, stack: Stack, judging: Judging, task: Task, latest: float) -> None:
-        """A drive that ends at `latest` [s] unless its task stops it earlier."""
+    def __init__(
+        self, ego: Ego, stack: Stack, judging: Judging, task: Task, latest: float, *, is_whole: bool = True
+    ) -> None:
+        """A drive that ends at `latest` [s] unless its task stops it earlier.
+
+        Unless it `is_whole`, every step forgets what the one before left: there is an outcome, but no record.
+        """
         self.ego = ego
+        self.judging = judging
+        self._is_whole = is_whole
         self._thresholds = judging.thresholds
         self._oracles = judging.oracles
         self._stack = stack
@@ -87,6 +105,7 @@ class Drive:
         self._is_stuck = False
         self._ending: Ending | None = None
         self._executions: dict[Component, list[Execution]] = {component: [] for component in COMPONENTS}
+        self._forgotten = dict.fromkeys(COMPONENTS, 0)  # how many before those
         self._altered: dict[Component, list[int]] = {component: [] for component in COMPONENTS}
         self._path: list[EgoTruth] = []
         self._stations: list[float] = []
@@ -124,6 +143,8 @@ class Drive:
         Raises:
             StackError: A component failed; which, in which cycle, and its own words.
         """
+        if not self._is_whole:
+            self._forget()
         self._moments.append(moment)
         self._judge(moment)
         self._ending = self._ended(moment)
@@ -149,13 +170,21 @@ class Drive:
         self._digests.append(self._digest.step(fresh, self._path[-TICKS_PER_STEP:], moment.objects))
         return True
 
-    def record(self, simulated: float) -> Record:
-        """What the drive left, `simulated` [s] of SUMO time having passed."""
+    def outcome(self) -> Outcome:
+        """How the drive came out that is over, or is cut here."""
         ending = self._ending or Ending.CUT
-        is_whole = math.isinf(self._contact)  # after a contact nothing was judged
-        judgements = tuple(oracle.conclude(ending if is_whole else Ending.CUT) for oracle in self._oracles)
+        is_judged = math.isinf(self._contact)  # after a contact nothing was judged
+        judgements = tuple(oracle.conclude(ending if is_judged else Ending.CUT) for oracle in self._oracles)
         known = {id(violation) for violation in self._violations}
         self._violations.extend(one for judged in judgements for one in judged.violations if id(one) not in known)
+        violations = sorted(self._violations, key=lambda violation: violation.time)
+        digest = Digest().step(self._digests, violations).hex()
+        return Outcome(tuple(violations), judgements, ending, digest)
+
+    def record(self, simulated: float) -> Record:
+        """What the whole drive left, `simulated` [s] of SUMO time having passed."""
+        assert self._is_whole  # else most of it is forgotten
+        outcome = self.outcome()
         return Record(
             ego=self.ego.name,
             route=self.ego.route,
@@ -167,13 +196,20 @@ class Drive:
             path=self._path,
             stations=self._stations,
             moments=self._moments,
-            violations=sorted(self._violations, key=lambda violation: violation.time),
-            judgements=judgements,
-            ending=ending,
+            violations=list(outcome.violations),
+            judgements=outcome.judgements,
+            ending=outcome.ending,
             simulated=simulated,
             substituted=self._substituted,
             digests=self._digests,
         )
+
+    def _forget(self) -> None:
+        for component, made in self._executions.items():
+            self._forgotten[component] += len(made)
+            made.clear()
+        for left in (self._path, self._stations, self._moments):
+            left.clear()
 
     def _execute(self, component: Component, moment: Moment) -> None:
         made = self._executions[component]
@@ -187,7 +223,7 @@ class Drive:
             return
         published: Message | None = message
         if self._interventions[component]:
-            published = self._intervened(component, len(made), message, moment)
+            published = self._intervened(component, self._forgotten[component] + len(made), message, moment)
         made.append(Execution(self._tick, published))
         if published is not None:
             setattr(self._channels, _CHANNELS[component], published)

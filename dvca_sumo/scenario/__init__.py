@@ -8,17 +8,17 @@ import msgspec
 
 from dvca_sumo.scenario.configuration import Configuration, read_configuration, seconds
 from dvca_sumo.scenario.departures import last_departure
-from dvca_sumo.scenario.ego import AUTO, arrival_position, find_ego
+from dvca_sumo.scenario.ego import AUTO, Definitions, find_ego
 from dvca_sumo.scenario.errors import ScenarioError
 from dvca_sumo.scenario.silence import silenced
 
 __all__ = [
     "AUTO",
     "STEP_LENGTH",
+    "Definitions",
     "Override",
     "Scenario",
     "ScenarioError",
-    "arrival_position",
     "last_departure",
     "load_scenario",
     "silenced",

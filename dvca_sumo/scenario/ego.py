@@ -51,22 +51,39 @@ def find_ego(configuration: Configuration, asked: str | None) -> str:
     )
 
 
-def arrival_position(configuration: Configuration, ego: str) -> float | None:
-    """Where on its last edge the ego shall arrive [m]; negative counts from the end; None: at the end.
+class Definitions:
+    """How a scenario's files define its vehicles: read once, asked about many."""
 
-    SUMO does not tell it of a running vehicle, so it is read from the vehicle's own definition.
+    def __init__(self, configuration: Configuration) -> None:
+        """Read them.
 
-    Raises:
-        ScenarioError: The definition holds something that is no position.
-    """
-    for _, text in texts_within((*configuration.routes, *configuration.additionals)):
-        for match in _VEHICLE.finditer(text):
-            name = match.group(2)
-            if name == ego or (match.group(1) == "flow" and ego.rpartition(".")[0] == name):
-                tag = text[match.start() : text.index(">", match.start())]
-                found = re.search(r"\barrivalPos\s*=\s*[\"']([^\"']*)", tag)
-                return _position(found.group(1), ego) if found else None
-    return None
+        Raises:
+            ScenarioError: A file cannot be read.
+        """
+        self._tags: dict[str, str] = {}  # first tag of each vehicle and trip, by name
+        self._flows: dict[str, str] = {}
+        for _, text in texts_within((*configuration.routes, *configuration.additionals)):
+            for match in _VEHICLE.finditer(text):
+                tags = self._flows if match.group(1) == "flow" else self._tags
+                tags.setdefault(match.group(2), text[match.start() : text.index(">", match.start())])
+
+    def has(self, vehicle: str) -> bool:
+        """Whether `--ego` accepts that name."""
+        return self._tag(vehicle) is not None
+
+    def arrival_position(self, vehicle: str) -> float | None:
+        """Where on its last edge it shall arrive [m]; negative counts from the end; None: at the end.
+
+        SUMO does not tell it of a running vehicle, so it is read from the vehicle's own definition.
+
+        Raises:
+            ScenarioError: The definition holds something that is no position.
+        """
+        found = re.search(r"\barrivalPos\s*=\s*[\"']([^\"']*)", self._tag(vehicle) or "")
+        return _position(found.group(1), vehicle) if found else None
+
+    def _tag(self, vehicle: str) -> str | None:
+        return self._tags.get(vehicle) or self._flows.get(vehicle.rpartition(".")[0])
 
 
 def _position(text: str, ego: str) -> float | None:

@@ -66,6 +66,18 @@ class Entry(msgspec.Struct, frozen=True):
     parameters: dict[str, str]  # the vehicle's own "dvca." parameters, without that prefix
 
 
+class Motion(msgspec.Struct, frozen=True):
+    """How a vehicle moves that SUMO drives."""
+
+    front_x: float  # [m]
+    front_y: float  # [m]
+    heading: float  # [rad]
+    speed: float  # [m/s]
+    acceleration: float  # [m/s^2]
+    is_on_road: bool  # not while it is teleported
+    edges: tuple[str, ...]  # of its present route
+
+
 class Session:
     """A running SUMO simulation; `close` ends it."""
 
@@ -90,7 +102,7 @@ class Session:
             libsumo.close()  # else what it had loaded would stay
             raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {_in_one_line(error)}") from None
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
-        self._crowds: dict[str, Crowd] = {}  # by ego
+        self._crowds: dict[str, Crowd] = {}  # by watched vehicle
         self._signals: dict[tuple[str, ...], _Signals] = {}  # by the heads asked for
 
     @property
@@ -117,6 +129,10 @@ class Session:
     def departed(self) -> tuple[str, ...]:
         """Vehicles inserted in the last step."""
         return tuple(libsumo.simulation.getDepartedIDList())
+
+    def arrived(self) -> tuple[str, ...]:
+        """Vehicles that came to the end of their trips in the last step."""
+        return tuple(libsumo.simulation.getArrivedIDList())
 
     def delay(self, vehicle: str) -> float:
         """How long a vehicle has been waiting for room to depart [s]; 0 before its time and while it is not known."""
@@ -154,6 +170,28 @@ class Session:
             parameters={name: text for name, text in texts.items() if text},
         )
 
+    def class_of(self, vehicle: str) -> str:
+        """The class of a vehicle that is in the simulation."""
+        return str(libsumo.vehicle.getVehicleClass(vehicle))
+
+    def has_stops(self, vehicle: str) -> bool:
+        """Whether a vehicle has stops of its own to make."""
+        return bool(libsumo.vehicle.getStops(vehicle, 1))
+
+    def motion(self, vehicle: str) -> Motion:
+        """How a vehicle moves that SUMO drives."""
+        of = libsumo.vehicle
+        x, y = of.getPosition(vehicle)
+        return Motion(
+            front_x=x,
+            front_y=y,
+            heading=math.radians(90.0 - of.getAngle(vehicle)),
+            speed=max(0.0, of.getSpeed(vehicle)),
+            acceleration=of.getAcceleration(vehicle),
+            is_on_road=abs(x) < _NOWHERE,
+            edges=tuple(of.getRoute(vehicle)),
+        )
+
     def adopt(self, entry: Entry, radius: float) -> None:
         """Take an inserted vehicle out of SUMO's hands; watch what is within `radius` [m] of it.
 
@@ -165,9 +203,22 @@ class Session:
         of.setWidth(entry.ego, entry.width)
         of.setVehicleClass(entry.ego, entry.vehicle_class)
         of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
-        self._crowds[entry.ego] = Crowd()
-        of.subscribeContext(entry.ego, tc.CMD_GET_VEHICLE_VARIABLE, radius, _VEHICLE)
-        of.subscribeContext(entry.ego, tc.CMD_GET_PERSON_VARIABLE, radius, _PERSON)
+        self.watch(entry.ego, radius)
+
+    def watch(self, vehicle: str, radius: float) -> None:
+        """Have `objects` ready for a vehicle: what is within `radius` [m] of it."""
+        of = libsumo.vehicle
+        self._crowds[vehicle] = Crowd()
+        of.subscribeContext(vehicle, tc.CMD_GET_VEHICLE_VARIABLE, radius, _VEHICLE)
+        of.subscribeContext(vehicle, tc.CMD_GET_PERSON_VARIABLE, radius, _PERSON)
+
+    def remove(self, vehicle: str) -> None:
+        """Take a vehicle out of the simulation."""
+        del self._crowds[vehicle]
+        of = libsumo.vehicle
+        for kind in (tc.CMD_GET_VEHICLE_VARIABLE, tc.CMD_GET_PERSON_VARIABLE):
+            of.unsubscribeContext(vehicle, kind, 0.0)  # else SUMO gives up at the next step
+        of.remove(vehicle)
 
     def place(self, ego: str, truth: EgoTruth, front: float, lane: str) -> None:
         """Put the ego where its own dynamics say; effective with the next step.
@@ -183,7 +234,7 @@ class Session:
         libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
 
     def objects(self, ego: str) -> ObjectsTruth:
-        """Every moving body near an adopted ego: vehicles (parked ones too), people on foot."""
+        """Every moving body near a watched vehicle: vehicles (parked ones too), people on foot."""
         names: list[str] = []
         motions: list[float] = []
         lanes: list[str] = []

@@ -41,13 +41,13 @@ from dvca_sumo.bench.baselines.whole_runs import whole_runs
 from dvca_sumo.bench.cases import Case, injected_cases
 from dvca_sumo.bench.runs import Setting, analysis_of
 from dvca_sumo.bench.score import BaselineScore, Score
-from dvca_sumo.bench.store import Store
 from dvca_sumo.bench.tables import json_of, terminal_text
 from dvca_sumo.cli import benching
 from dvca_sumo.interventions import Ideal
 from dvca_sumo.messages import COMPONENTS, Component, ControlCommand, MessageId
 from dvca_sumo.record import Record
 from dvca_sumo.run import Task
+from dvca_sumo.store import Store
 
 LOCALIZATION, PERCEPTION, PREDICTION, PLANNING, CONTROL = COMPONENTS
 BEFORE = 45  # 10 Hz messages up to the hit, 4.4 s after the departure

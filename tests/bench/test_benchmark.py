@@ -10,8 +10,8 @@ from dvca_sumo.bench.benchmark import run_benchmark
 from dvca_sumo.bench.cases import Case
 from dvca_sumo.bench.runs import Setting, analysed
 from dvca_sumo.bench.score import FAILED, Score
-from dvca_sumo.bench.store import Store
 from dvca_sumo.messages import Component
+from dvca_sumo.store import Store
 
 CASES = [
     Case("injected", name, "nets/cs1.sumocfg", Component.PERCEPTION, fault="perception.miss")

@@ -16,11 +16,11 @@ from dvca_sumo.bench.places import BUILT_IN, HealthyDrive, healthy_drives, place
 from dvca_sumo.bench.random_faults import Drawing, drawn_case, is_violating, random_scores
 from dvca_sumo.bench.runs import Setting
 from dvca_sumo.bench.score import Score, failed
-from dvca_sumo.bench.store import Store
 from dvca_sumo.cli import ExitCode
 from dvca_sumo.interventions import fault_library, planted_fault
 from dvca_sumo.messages import Component
 from dvca_sumo.scenario import ScenarioError
+from dvca_sumo.store import Store
 
 SETTING = Setting(has_controls=False)
 DRIVES = [HealthyDrive(place, "", 40.0, ("lead", "person:walker")) for place in BUILT_IN]

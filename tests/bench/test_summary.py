@@ -1,23 +1,12 @@
-"""Shares, intervals and checks: formulas, and what must not pass."""
+"""Checks: what must not pass."""
 
 import pytest
 from msgspec.structs import replace
 
 from bench.scores import HOLDING, score
 from dvca_sumo.bench.score import FAILED, Controls, Score
-from dvca_sumo.bench.share import share_of
 from dvca_sumo.bench.summary import summary_of
-
-
-@pytest.mark.parametrize(
-    ("count", "total", "low", "high"),
-    [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718), (0, 0, 0, 1)],
-)
-def test_the_interval_of_a_share_is_wilsons(count: int, total: int, low: float, high: float) -> None:
-    """Against R. G. Newcombe (1998), table I, method 3."""
-    share = share_of(count, total)
-    assert share.low == pytest.approx(low, abs=1e-4)
-    assert share.high == pytest.approx(high, abs=1e-4)
+from dvca_sumo.intervals import share_of
 
 
 def test_cases_that_are_all_right_pass_every_check() -> None:

@@ -91,6 +91,10 @@ BROKEN = {
         routes=EGO.replace('from="bc"', 'from="ab"'),
         additional='<vaporizer id="bc" begin="0" end="900"/>',
     ),
+    "ego on rails": Broken(
+        ("'ego' is of class rail", "road vehicles"),
+        routes='<vType id="train" vClass="rail"/>' + EGO.replace("<trip", '<trip type="train"'),
+    ),
     "threshold ill-typed": Broken(
         ("dvca.ttc", "'ego'", "'soon'", "allowed"),
         routes=EGO.replace("/>", '><param key="dvca.ttc" value="soon"/></trip>'),

@@ -4,7 +4,7 @@ from typing import cast
 from oracle_scenes import BareMap, car, drive, stop_line, straight_road
 
 from dvca_sumo.messages import SignalColour
-from dvca_sumo.oracles import ORACLES, judge, judges
+from dvca_sumo.oracles import ORACLES, Places, judge, judges
 from dvca_sumo.roadmap import Control, RoadMap
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import Moment
@@ -19,7 +19,7 @@ def reckless() -> list[Moment]:
 
 
 def test_one_run_is_judged_by_every_oracle() -> None:
-    found = judge(reckless(), judges(ROUTE, Thresholds(), ROADMAP), Ending.CUT)
+    found = judge(reckless(), judges(Places(ROUTE, ROADMAP), Thresholds()), Ending.CUT)
     assert [judgement.kind for judgement in found] == [
         "collision",
         "ttc",
@@ -38,14 +38,14 @@ def test_one_run_is_judged_by_every_oracle() -> None:
 
 
 def test_every_violation_is_returned_once_and_kept_in_the_judgement() -> None:
-    oracles = judges(ROUTE, Thresholds(), ROADMAP)
+    oracles = judges(Places(ROUTE, ROADMAP), Thresholds())
     returned = [found for moment in reckless() for oracle in oracles if (found := oracle.observe(moment)) is not None]
     concluded = [found for oracle in oracles for found in oracle.conclude(Ending.CUT).violations]
     assert sorted(returned, key=str) == sorted(concluded, key=str)
 
 
 def test_a_copy_made_in_mid_run_goes_on_to_the_same_answers() -> None:
-    oracles = judges(ROUTE, Thresholds(), ROADMAP)
+    oracles = judges(Places(ROUTE, ROADMAP), Thresholds())
     moments = reckless()
     judge(moments[:50], oracles, Ending.CUT)
     copies = pickle.loads(pickle.dumps(oracles))  # noqa: S301

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from small_scenarios import scenario_file
 
-from dvca_sumo.scenario import AUTO, ScenarioError, arrival_position, load_scenario
+from dvca_sumo.scenario import AUTO, Definitions, ScenarioError, load_scenario
 from dvca_sumo.scenario.configuration import read_configuration
 
 MARK = '<param key="dvca.ego" value="true"/>'
@@ -88,7 +88,7 @@ def test_an_ego_is_found_in_additional_and_included_files(tmp_path: Path, net: P
     )
     config = scenario_file(tmp_path, net, "", '<include href="deeper/more.xml"/>')
     assert load_scenario(config).ego == "ego"
-    assert arrival_position(read_configuration(config), "ego") == 7.0
+    assert Definitions(read_configuration(config)).arrival_position("ego") == 7.0
 
 
 def test_a_marked_ego_is_found_in_a_gzipped_file(tmp_path: Path, net: Path) -> None:
@@ -134,15 +134,15 @@ def test_the_arrival_position_is_the_vehicles_own(
     config = scenario_file(
         tmp_path, net, f'{other}{commented}<vehicle\n  depart="0" id="ego"\n {attribute}>{MARK}</vehicle>'
     )
-    assert arrival_position(read_configuration(config), "ego") == expected
+    assert Definitions(read_configuration(config)).arrival_position("ego") == expected
 
 
 def test_the_arrival_position_of_a_flow_is_that_of_its_vehicles(tmp_path: Path, net: Path) -> None:
     config = scenario_file(tmp_path, net, '<flow id="f" number="3" arrivalPos="12"/>')
-    assert arrival_position(read_configuration(config), "f.2") == 12.0
+    assert Definitions(read_configuration(config)).arrival_position("f.2") == 12.0
 
 
 def test_an_arrival_position_that_is_none_is_refused(tmp_path: Path, net: Path) -> None:
     config = scenario_file(tmp_path, net, '<vehicle id="ego" arrivalPos="center"/>')
     with pytest.raises(ScenarioError, match=r"arrivalPos of ego is no position: 'center' \(allowed: metres, max"):
-        arrival_position(read_configuration(config), "ego")
+        Definitions(read_configuration(config)).arrival_position("ego")

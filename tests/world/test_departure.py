@@ -61,20 +61,44 @@ def test_an_ego_whose_place_stays_taken_is_not_awaited_for_ever(tmp_path: Path, 
         entered(config)
 
 
-def test_an_ego_that_sumo_removes_ends_the_run(tmp_path: Path, street: Path) -> None:
+def test_the_world_says_which_ego_sumo_removed(tmp_path: Path, street: Path) -> None:
     scenario = load_scenario(scenario_file(tmp_path, street, STANDING))
     roadmap = RoadMap.load(street)
 
-    def job() -> None:
+    def job() -> list[list[str]]:
         import libsumo  # noqa: PLC0415
 
         world = World(scenario, tmp_path)
         entry = world.await_ego((), lambda _: True)
         world.adopt(entry, roadmap.route(entry.edges, entry.lane, entry.position, None, 200.0), VehicleLimits())
-        world.advance()
+        lost = [world.advance()]
         step = libsumo.simulationStep
         libsumo.simulationStep = lambda: (step(), libsumo.vehicle.remove("ego"))
-        world.advance()
+        lost.append(world.advance())
+        return [[ego.name for ego in egos] for egos in lost]
 
-    with pytest.raises(ScenarioError, match=r"SUMO removed the ego 'ego' at 0\.3 s"):
-        in_child(job)
+    assert in_child(job) == [[], ["ego"]]
+
+
+def test_a_dismissed_ego_is_gone_and_the_world_goes_on(tmp_path: Path, street: Path) -> None:
+    other = STANDING.replace('"ego"', '"other"').replace('"20"', '"60"')
+    scenario = load_scenario(scenario_file(tmp_path, street, STANDING + other))
+    roadmap = RoadMap.load(street)
+
+    def job() -> list[tuple[str, ...]]:
+        world = World(scenario, tmp_path)
+        world.advance()
+        egos = []
+        for name in sorted(world.departed()):
+            entry = world.entry(name, ())
+            route = roadmap.route(entry.edges, entry.lane, entry.position, None, 200.0)
+            egos.append(world.adopt(entry, route, VehicleLimits()))
+        seen = []
+        for step in range(6):
+            if step == 3:
+                world.dismiss(egos[0])
+            assert world.advance() == ()
+            seen.append(world.observe(egos[1]).objects.ids)
+        return seen
+
+    assert in_child(job) == [("ego",)] * 3 + [()] * 3

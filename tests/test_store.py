@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-
 from bench.scores import score
+
 from dvca_sumo.bench.score import Score
-from dvca_sumo.bench.store import Store, StoreError, key_of
+from dvca_sumo.store import Store, StoreError, key_of
 
 
 def test_what_was_added_is_found_by_the_next_one(tmp_path: Path) -> None:

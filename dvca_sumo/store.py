@@ -1,4 +1,4 @@
-"""Answers kept on disk as they are found, so that an interrupted benchmark goes on where it stopped."""
+"""Answers kept on disk as they are found, so that what was interrupted goes on where it stopped."""
 
 import hashlib
 from collections.abc import Sequence

@@ -1,0 +1,124 @@
+"""How a vehicle of a scenario becomes an ego: its route, its stack, its oracles."""
+
+import math
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from dvca_sumo.oracles import Places, judges
+from dvca_sumo.roadmap import RoadMap, Route, RouteError
+from dvca_sumo.run.drive import Drive, Judging
+from dvca_sumo.run.task import Task
+from dvca_sumo.scenario import Definitions, Scenario, ScenarioError
+from dvca_sumo.stack.reference import StackContext, StackFactory
+from dvca_sumo.thresholds import Thresholds
+from dvca_sumo.world import Entry, VehicleLimits, World, shape_of
+
+_SHORTEST_AUTO_TRIP = 500.0  # [m]
+# Longest allowed duration of a trip, unless the scenario ends before.
+_PATIENCE = 3.0  # times the free-flow travel time ...
+_PATIENCE_BASE = 90.0  # [s] ... plus this
+_OFF_ROAD = ("tram", "rail_urban", "rail", "rail_electric", "rail_fast", "cable_car", "subway", "ship", "aircraft")
+
+RoadMapOf = Callable[[str], RoadMap]  # the scenario's map as drivers of a vehicle class see it
+
+
+class Departing:
+    """Makes egos of vehicles of one scenario, all with stacks of one factory."""
+
+    def __init__(self, scenario: Scenario, roadmap_of: RoadMapOf, factory: StackFactory) -> None:
+        self._scenario = scenario
+        self._roadmap_of = roadmap_of
+        self._factory = factory
+
+    @cached_property
+    def definitions(self) -> Definitions:
+        """Of the scenario's vehicles."""
+        return Definitions(self._scenario.configuration)
+
+    def awaited(self, world: World) -> Entry:
+        """The scenario's ego at its departure.
+
+        Raises:
+            ScenarioError: It never departs.
+        """
+        return world.await_ego(Thresholds.__struct_fields__, self._is_fit)
+
+    def entry(self, vehicle: str, world: World) -> Entry:
+        """Another vehicle that has just departed."""
+        return world.entry(vehicle, Thresholds.__struct_fields__)
+
+    def route(self, entry: Entry) -> Route:
+        """The way from where a vehicle stands to its arrival position.
+
+        Raises:
+            RouteError: There is none that can be driven.
+            ScenarioError: Its definition holds an arrival position that is none.
+        """
+        roadmap = self._roadmap_of(entry.vehicle_class)
+        length = roadmap.lanes[f"{entry.edges[-1]}_0"].length
+        arrival = self.definitions.arrival_position(entry.ego)
+        if arrival is None:
+            arrival = length
+        elif arrival < 0.0:
+            arrival += length
+        return roadmap.route(entry.edges, entry.lane, entry.position, None, min(max(arrival, 0.0), length))
+
+    def judging(self, entry: Entry, route: Route) -> Judging:
+        """Fresh oracles for a trip, with the vehicle's own thresholds.
+
+        Raises:
+            ScenarioError: A threshold is none.
+        """
+        thresholds = _thresholds(entry)
+        places = Places(route, self._roadmap_of(entry.vehicle_class))
+        return Judging(judges(places, thresholds), thresholds, places)
+
+    def latest(self, entry: Entry, route: Route) -> float:
+        """When a trip ends at the latest [s]: at the scenario's end, or when patience does."""
+        patience = _PATIENCE_BASE + _PATIENCE * free_flow(route)
+        return min(entry.time + patience, math.inf if self._scenario.end is None else self._scenario.end)
+
+    def drive(self, entry: Entry, task: Task, world: World, *, is_whole: bool = True) -> Drive:
+        """Adopt a vehicle that has just departed; see `Drive` for `is_whole`.
+
+        Raises:
+            ScenarioError: It cannot be the ego.
+            StackError: The stack cannot be built.
+        """
+        if entry.vehicle_class in _OFF_ROAD:
+            raise ScenarioError(f"the ego {entry.ego!r} is of class {entry.vehicle_class}: allowed are road vehicles")
+        try:
+            route = self.route(entry)
+        except RouteError as error:
+            raise ScenarioError(f"the ego {entry.ego!r} has no drivable route: {error}") from None
+        judging = self.judging(entry, route)
+        stack = self._factory(StackContext(self._roadmap_of(entry.vehicle_class), route, shape_of(entry), task.seed))
+        ego = world.adopt(entry, route, VehicleLimits())
+        return Drive(ego, stack, judging, task, self.latest(entry, route), is_whole=is_whole)
+
+    def _is_fit(self, entry: Entry) -> bool:
+        try:
+            route = self.route(entry)
+        except RouteError:
+            return False
+        return route.destination - route.start >= _SHORTEST_AUTO_TRIP
+
+
+def free_flow(route: Route) -> float:
+    """How long a trip takes at the speed limits [s]."""
+    stations = route.line.stations
+    driven = (stations[1:] > route.start) & (stations[1:] <= route.destination)
+    return float(np.sum(np.diff(stations)[driven] / route.speed_limits[1:][driven]))
+
+
+def _thresholds(entry: Entry) -> Thresholds:
+    for name, text in entry.parameters.items():
+        try:
+            is_allowed = float(text) >= 0.0  # NaN is not
+        except ValueError:
+            is_allowed = False
+        if not is_allowed:
+            raise ScenarioError(f"parameter dvca.{name} of the ego {entry.ego!r} is {text!r} (allowed: 0 or more)")
+    return Thresholds(**{name: float(text) for name, text in entry.parameters.items()})

@@ -1,0 +1,105 @@
+"""What the simulator does that no driver survives.
+
+The rule: a body appears within sight without having come there (it was inserted, or teleported), or moves farther in
+one step than its speed allows (a jump; SUMO's lane changes are such jumps), and at that moment it touches the ego, or
+it is so close in the ego's way that full braking after a reaction would not keep the ego off it. For a while after,
+violations with that body are the simulator's doing.
+"""
+
+import math
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.geometry.boxes import distances
+from dvca_sumo.messages import Integers
+from dvca_sumo.oracles import Places
+from dvca_sumo.oracles.ahead import ahead
+from dvca_sumo.truth import Moment, ObjectsTruth
+
+IN_SIGHT = 120.0  # [m] of a body that comes nearer on its own way, it was seen before
+LEAP = 1.0  # [m] in one step, beyond what the greater of its speeds before and after allows
+REACTION = 0.5  # [s]
+BRAKING = 8.0  # [m/s^2]
+TOUCHING = 0.2  # [m]
+LASTING = 5.0  # [s]
+
+
+class Disturbance(msgspec.Struct, frozen=True):
+    """One body that came out of nowhere, too near."""
+
+    time: float  # [s]
+    object: str
+    how: str  # "appeared" or "jumped"
+
+
+class Disturbances:
+    """Those that one ego met up to now."""
+
+    def __init__(self, places: Places) -> None:
+        """The watch over one drive, `places` being its oracles'."""
+        self.found: list[Disturbance] = []
+        self._places = places
+        self._before: ObjectsTruth | None = None
+        self._rows: dict[str, int] = {}  # by name, in the moment before
+
+    def see(self, moment: Moment) -> None:
+        """Take in the next moment. To an ego that has just departed, every body has just appeared."""
+        objects, before = moment.objects, self._before
+        names = objects.ids
+        rows = (
+            self._rows if before is not None and names == before.ids else {name: row for row, name in enumerate(names)}
+        )
+        appeared = [row for name, row in rows.items() if name not in self._rows]
+        jumped: list[int] = []
+        if before is not None:
+            common = [name for name in names if name in self._rows]
+            now = np.array([rows[name] for name in common], dtype=np.int64)
+            jumped = now[
+                _leaps(objects, now, before, np.array([self._rows[name] for name in common], dtype=np.int64))
+            ].tolist()
+        for how, candidates in (("appeared", appeared), ("jumped", jumped)):
+            for row in self._too_near(moment, candidates):
+                self.found.append(Disturbance(moment.time, names[row], how))
+        self._before, self._rows = objects, rows
+
+    def explain(self, name: str | None, time: float) -> Disturbance | None:
+        """The disturbance by that body that a violation at `time` [s] comes from."""
+        return next((one for one in self.found if one.object == name and 0.0 <= time - one.time <= LASTING), None)
+
+    def _too_near(self, moment: Moment, rows: list[int]) -> list[int]:
+        ego, objects = moment.ego, moment.objects
+        chosen = np.array(
+            [
+                row
+                for row in rows
+                if math.dist((ego.x, ego.y), (objects.boxes[row, 0], objects.boxes[row, 1])) < IN_SIGHT
+            ],
+            dtype=np.int64,
+        )
+        if chosen.size == 0:
+            return []
+        touching = chosen[distances(self._places.at(moment).box, objects.boxes[chosen]) < TOUCHING].tolist()
+        found = ahead(self._places, moment, IN_SIGHT, rows=np.sort(chosen))
+        closing = np.maximum(ego.speed - np.maximum(found.speeds, 0.0), 0.0)
+        needed = REACTION * closing + closing * closing / (2.0 * BRAKING)
+        return sorted({*touching, *found.rows[found.gaps < needed].tolist()})
+
+
+def _leaps(now: ObjectsTruth, rows: Integers, before: ObjectsTruth, rows_before: Integers) -> Integers:
+    """Where among `rows` bodies are that went farther than they can; (k,) each."""
+    passed = now.time - before.time
+    speeds = np.maximum(
+        np.hypot(now.velocities[rows, 0], now.velocities[rows, 1]),
+        np.hypot(before.velocities[rows_before, 0], before.velocities[rows_before, 1]),
+    )
+    moved = _fronts(now)[rows] - _fronts(before)[rows_before]
+    found: Integers = np.flatnonzero(np.hypot(moved[:, 0], moved[:, 1]) > speeds * passed + LEAP)
+    return found
+
+
+def _fronts(objects: ObjectsTruth) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """Where bodies touch the road first: (n, 2); SUMO moves vehicles by their fronts."""
+    boxes = objects.boxes
+    half = 0.5 * boxes[:, 3]
+    return np.stack([boxes[:, 0] + half * np.cos(boxes[:, 2]), boxes[:, 1] + half * np.sin(boxes[:, 2])], axis=1)

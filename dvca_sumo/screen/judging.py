@@ -1,0 +1,95 @@
+"""Whose doing a violation is, by written rules.
+
+1. The simulator's: see `disturbances`.
+2. The other one's: it ran into the standing ego; it ran into the ego from behind while the ego was in its lane; it
+   touched the flank of an ego that was in its lane and not on a junction. Then time to collision and distance to that
+   same object just before are its doing, too. And a
+   destination is not reached for the others' sake when SUMO's own driver on the same trip had not arrived after the
+   same time either.
+3. Everything else is the driver's: the ego's own. Traffic rules are always the driver's.
+
+The ego is in its lane when no corner of its body is more than 0.3 m beyond the edges of the lane under its middle.
+"""
+
+import enum
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.geometry.boxes import box_of, corners
+from dvca_sumo.roadmap import Lane, RoadMap
+from dvca_sumo.screen.disturbances import Disturbances
+from dvca_sumo.truth import Moment
+from dvca_sumo.violations import Contact, Judgement, Violation
+
+_TOLERANCE = 0.3  # [m] as of the oracle of the lane
+_NEAR = 3.0  # [m] from its middle a lane is under the ego
+_BEFORE = 5.0  # [s] before a contact what is about the same object belongs to it
+
+
+class Fault(enum.StrEnum):
+    """Whose doing a violation is."""
+
+    DRIVER = "driver"
+    OTHER = "other"
+    SIMULATOR = "simulator"
+
+
+class Judged(msgspec.Struct, frozen=True):
+    """One violation of one trip."""
+
+    oracle: str
+    violation: Violation
+    fault: Fault
+    reason: str  # why it is not the driver's; empty if it is
+    is_alone: bool | None = None  # whether it also occurs with no other ego in the simulation; None: not known
+
+
+def judged(
+    judgements: Sequence[Judgement], disturbances: Disturbances, end: Moment, roadmap: RoadMap
+) -> tuple[Judged, ...]:
+    """All violations of a drive by time, `end` being its last moment that was judged: its contact, if it has one."""
+    violations = [(judgement.kind, violation) for judgement in judgements for violation in judgement.violations]
+    contact = next((one for _, one in violations if one.contact is not None), None)
+    excuse = "" if contact is None else _excuse(contact, end, roadmap)
+    found = []
+    for oracle, violation in violations:
+        disturbance = disturbances.explain(violation.object, violation.time)
+        if violation.object is not None and disturbance is not None:
+            reason = f"{disturbance.object} {disturbance.how} at {disturbance.time:.1f} s"
+            found.append(Judged(oracle, violation, Fault.SIMULATOR, reason))
+        elif excuse and contact is not None and _belongs(violation, contact):
+            found.append(Judged(oracle, violation, Fault.OTHER, excuse))
+        else:
+            found.append(Judged(oracle, violation, Fault.DRIVER, ""))
+    return tuple(sorted(found, key=lambda one: one.violation.time))
+
+
+def _belongs(violation: Violation, contact: Violation) -> bool:
+    return violation.object == contact.object and contact.time - violation.time <= _BEFORE
+
+
+def _excuse(contact: Violation, moment: Moment, roadmap: RoadMap) -> str:
+    """Why a contact is the other one's doing; empty if it is not."""
+    if contact.contact is Contact.STOPPED_EGO:
+        return "ran into the standing ego"
+    if contact.contact is Contact.ACTIVE_FRONT:
+        return ""
+    lane = _lane_kept(moment, roadmap)
+    if lane is not None and contact.contact is Contact.HIT_FROM_BEHIND:
+        return "ran into the ego from behind"
+    return "touched the ego in its lane" if lane is not None and not lane.is_internal else ""
+
+
+def _lane_kept(moment: Moment, roadmap: RoadMap) -> Lane | None:
+    """The lane under the ego's middle if the whole ego is in it."""
+    ego = moment.ego
+    box = box_of(ego.x, ego.y, ego.heading, moment.shape)
+    near = roadmap.lanes_near(box[None, :2], _NEAR)[0]
+    for name in near:
+        lane = roadmap.lanes[name]
+        _, offsets = lane.line.project(corners(box[None])[0])
+        if float(np.abs(offsets).max()) <= 0.5 * lane.width + _TOLERANCE:
+            return lane
+    return None

@@ -1,0 +1,80 @@
+"""What is kept of one trip."""
+
+import enum
+
+import msgspec
+
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.run import Judging
+from dvca_sumo.screen.disturbances import Disturbances
+from dvca_sumo.screen.judging import Judged, judged
+from dvca_sumo.screen.measures import Measures
+from dvca_sumo.truth import Moment
+from dvca_sumo.violations import Judgement
+
+
+class Outcome(enum.StrEnum):
+    """How a trip came out."""
+
+    ARRIVED = "arrived"
+    TIME_OVER = "time_over"  # of its patience, or no progress
+    CONTACT = "contact"
+    ABORTED = "aborted"  # the stack failed, or SUMO took the vehicle away
+    NOT_DRIVEN = "not_driven"
+
+
+class TripResult(msgspec.Struct, frozen=True):
+    """One trip in short."""
+
+    ego: str
+    outcome: Outcome
+    reason: str = ""  # of ABORTED and NOT_DRIVEN
+    start: float = 0.0  # [s] of its departure
+    distance: float = 0.0  # [m]
+    duration: float = 0.0  # [s]
+    hard_brakings: int = 0
+    least_ttc: float | None = None  # [s]; None: none below the horizon
+    violations: tuple[Judged, ...] = ()
+    unknown: tuple[str, ...] = ()  # oracles that could not tell
+    digest: str = ""  # of an ego's run, as in the result of `run`
+
+
+class Watch:
+    """Measures and disturbances of one drive; `result` sums them up."""
+
+    def __init__(self, ego: str, judging: Judging, roadmap: RoadMap) -> None:
+        self._ego = ego
+        self._roadmap = roadmap
+        self._measures = Measures(judging.places, judging.thresholds)
+        self._disturbances = Disturbances(judging.places)
+
+        self._contact: Moment | None = None
+
+    def see(self, moment: Moment) -> None:
+        """Take in the next moment."""
+        self._measures.see(moment)
+        self._disturbances.see(moment)
+
+    def touch(self, moment: Moment) -> None:
+        """Take in the moment of the contact, of a drive that goes on after it."""
+        self._contact = moment
+
+    def result(
+        self, outcome: Outcome, judgements: tuple[Judgement, ...], reason: str = "", digest: str = ""
+    ) -> TripResult:
+        """The trip, when it is over."""
+        measures, last = self._measures, self._measures.last
+        assert last is not None  # a drive begins with a look around
+        return TripResult(
+            ego=self._ego,
+            outcome=outcome,
+            reason=reason,
+            start=round(last.time - measures.duration, 3),
+            distance=measures.distance,
+            duration=round(measures.duration, 3),
+            hard_brakings=measures.hard_brakings,
+            least_ttc=measures.least_ttc,
+            violations=judged(judgements, self._disturbances, self._contact or last, self._roadmap),
+            unknown=tuple(one.kind for one in judgements if one.answer == "unknown"),
+            digest=digest,
+        )

@@ -1,0 +1,119 @@
+"""What the trips of one driver come to.
+
+Rates are events over exposure with the exact Poisson interval, shares have Wilson's; see `intervals`.
+"""
+
+import statistics
+from collections import Counter
+from collections.abc import Sequence
+
+import msgspec
+
+from dvca_sumo.intervals import Rate, Share, rate_of, share_of
+from dvca_sumo.oracles import ORACLES
+from dvca_sumo.screen.judging import Fault
+from dvca_sumo.screen.results import Outcome, TripResult
+
+NEAR = (1, 2, 3)  # [s] of time to collision
+
+
+class OracleSummary(msgspec.Struct, frozen=True):
+    """What one oracle found on all trips."""
+
+    violations: int
+    kinds: dict[str, int]
+    by_fault: dict[str, int]  # driver, other, simulator
+    per_1000_km: Rate  # the driver's own
+    per_100_trips: Rate  # likewise
+    trips: Share  # with at least one violation of the driver's own
+    unknown: int  # trips on which it could not tell
+
+
+class Quartiles(msgspec.Struct, frozen=True):
+    """Of one figure over trips; all None of none."""
+
+    count: int
+    low: float | None
+    median: float | None
+    high: float | None
+
+
+class DriverSummary(msgspec.Struct, frozen=True):
+    """All trips of one driver."""
+
+    trips: int  # that were driven
+    not_driven: int
+    completed: Share
+    km: float
+    hours: float
+    outcomes: dict[str, int]
+    at_fault_collisions: int
+    at_fault_violations: int
+    others_fault_violations: int
+    simulator_violations: int
+    violations_per_1000_km: Rate  # the driver's own
+    violations_per_100_trips: Rate  # likewise
+    by_oracle: dict[str, OracleSummary]
+    travel_time_ratio: Quartiles  # to SUMO's driver on the same trip, where both arrived
+    hard_brakings_per_100_km: Rate
+    least_ttc: Quartiles  # [s] of the trips with one below the horizon
+    ttc_below: dict[str, Share]  # by seconds: trips with a shorter one
+
+
+def summary_of(results: Sequence[TripResult], like: Sequence[TripResult]) -> DriverSummary:
+    """Sum up one driver's trips; travel times are relative to those of `like`."""
+    trips = [result for result in results if result.outcome is not Outcome.NOT_DRIVEN]
+    km = sum(trip.distance for trip in trips) / 1000.0
+    faults = Counter(one.fault for trip in trips for one in trip.violations)
+    own = faults[Fault.DRIVER]
+    reference = {trip.ego: trip.duration for trip in like if trip.outcome is Outcome.ARRIVED}
+    ratios = [
+        trip.duration / reference[trip.ego]
+        for trip in trips
+        if trip.outcome is Outcome.ARRIVED and reference.get(trip.ego, 0.0) > 0.0
+    ]
+    nearest = [trip.least_ttc for trip in trips if trip.least_ttc is not None]
+    return DriverSummary(
+        trips=len(trips),
+        not_driven=len(results) - len(trips),
+        completed=share_of(sum(trip.outcome is Outcome.ARRIVED for trip in trips), len(trips)),
+        km=km,
+        hours=sum(trip.duration for trip in trips) / 3600.0,
+        outcomes=dict(Counter(trip.outcome.value for trip in results)),
+        at_fault_collisions=sum(
+            one.violation.contact is not None and one.fault is Fault.DRIVER for trip in trips for one in trip.violations
+        ),
+        at_fault_violations=own,
+        others_fault_violations=faults[Fault.OTHER],
+        simulator_violations=faults[Fault.SIMULATOR],
+        violations_per_1000_km=rate_of(own, km / 1000.0),
+        violations_per_100_trips=rate_of(own, len(trips) / 100.0),
+        by_oracle={oracle.kind: _oracle(oracle.kind, trips, km) for oracle in ORACLES},
+        travel_time_ratio=_quartiles(ratios),
+        hard_brakings_per_100_km=rate_of(sum(trip.hard_brakings for trip in trips), km / 100.0),
+        least_ttc=_quartiles(nearest),
+        ttc_below={str(limit): share_of(sum(ttc < limit for ttc in nearest), len(trips)) for limit in NEAR},
+    )
+
+
+def _oracle(kind: str, trips: Sequence[TripResult], km: float) -> OracleSummary:
+    found = [[one for one in trip.violations if one.oracle == kind] for trip in trips]
+    own = [sum(one.fault is Fault.DRIVER for one in some) for some in found]
+    faults = Counter(one.fault for some in found for one in some)
+    return OracleSummary(
+        violations=sum(map(len, found)),
+        kinds=dict(Counter(one.violation.kind for some in found for one in some)),
+        by_fault={fault.value: faults[fault] for fault in Fault},
+        per_1000_km=rate_of(sum(own), km / 1000.0),
+        per_100_trips=rate_of(sum(own), len(trips) / 100.0),
+        trips=share_of(sum(number > 0 for number in own), len(trips)),
+        unknown=sum(kind in trip.unknown for trip in trips),
+    )
+
+
+def _quartiles(values: Sequence[float]) -> Quartiles:
+    if len(values) < 2:
+        only = values[0] if values else None
+        return Quartiles(len(values), only, only, only)
+    low, median, high = statistics.quantiles(values, n=4, method="inclusive")
+    return Quartiles(len(values), low, median, high)

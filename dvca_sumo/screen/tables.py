@@ -1,0 +1,182 @@
+"""A screening as data and as text."""
+
+import shlex
+from collections.abc import Callable, Collection, Sequence
+
+import msgspec
+
+from dvca_sumo.intervals import Rate, Share
+from dvca_sumo.report.result import Json, versions, violation_json
+from dvca_sumo.screen.judging import Judged
+from dvca_sumo.screen.results import Outcome, TripResult
+from dvca_sumo.screen.screening import Screening, Setting
+from dvca_sumo.screen.summary import DriverSummary, Quartiles, summary_of
+
+SCHEMA = 1
+_ALONE = {True: "yes", False: "no", None: "not known"}
+
+
+def json_of(screening: Screening) -> Json:
+    """The whole screening, of JSON types only."""
+    setting, draw = screening.setting, screening.draw
+    scenario = setting.scenario
+    ads, sumo = _summaries(screening)
+    return {
+        "schema": SCHEMA,
+        "scenario": {
+            "config": str(scenario.configuration.path),
+            "seed": scenario.seed,
+            "begin": scenario.begin,
+            "end": setting.window_end if setting.window_end is not None else scenario.end,
+            "egos": setting.egos,
+            "concurrent": setting.concurrent,
+            "stack": setting.source.stack,
+        },
+        "draw": {"departures": draw.departures, "refused": draw.refused, "drawn": len(draw.trips)},
+        "ads": msgspec.to_builtins(ads),
+        "sumo_driver": msgspec.to_builtins(sumo),
+        "violations": [
+            _violation(trip, one, setting, driver)
+            for driver, trips in (("ads", screening.ads), ("sumo_driver", screening.sumo_driver))
+            for trip in trips
+            for one in trip.violations
+        ],
+        "trips": [
+            {**msgspec.to_builtins(trip), "ads": _trip(ours), "sumo_driver": _trip(theirs)}
+            for trip, ours, theirs in zip(draw.trips, screening.ads, screening.sumo_driver, strict=True)
+        ],
+        "versions": versions(),
+    }
+
+
+def has_failed(screening: Screening) -> bool:
+    """Whether the ADS has violated anything by its own doing."""
+    return _summaries(screening)[0].at_fault_violations > 0
+
+
+def has_gaps(screening: Screening) -> bool:
+    """Whether a trip could not be driven."""
+    return any(trip.outcome in (Outcome.NOT_DRIVEN, Outcome.ABORTED) for trip in screening.ads)
+
+
+def terminal_text(screening: Screening) -> str:
+    """The tables for a terminal."""
+    ads, sumo = _summaries(screening)
+    wanted, drawn = screening.setting.egos, len(screening.draw.trips)
+    parts = [
+        f"{drawn} trips drawn of {screening.draw.departures} departures"
+        + (f" (no more than that of {wanted} asked for)" if drawn < wanted else ""),
+        _table([["", "ADS", "SUMO's driver"], *([name, say(ads), say(sumo)] for name, say in _ROWS)]),
+        "Violations of the driver's own doing per 1 000 km and per 100 trips, 95 % intervals (others', simulator's)\n"
+        + _table([["oracle", "ADS", "", "", "SUMO's driver", "", ""], *_by_oracle(ads, sumo)]),
+    ]
+    listed = [_line(trip, one, screening.setting) for trip in screening.ads for one in trip.violations]
+    if listed:
+        parts.append("Violations of the ADS, and how to see each\n" + "\n".join(listed))
+    lost = [
+        f"{driver} {trip.ego}: {trip.outcome.value}: {trip.reason}"
+        for driver, trips in (("ADS", screening.ads), ("SUMO's driver", screening.sumo_driver))
+        for trip in trips
+        if trip.reason
+    ]
+    if lost:
+        parts.append("Trips that were not driven, or not to their end\n" + "\n".join(lost))
+    return "\n\n".join(parts)
+
+
+def command(setting: Setting, ego: str) -> str:
+    """What reproduces and attributes a violation of that ego, driven alone."""
+    scenario = setting.scenario
+    words = ["dvca-sumo", "run", str(scenario.configuration.path), "--ego", ego]
+    words += ["--seed", str(scenario.seed), "--begin", f"{scenario.begin:.12g}"]
+    return shlex.join([*words, *(["--stack", setting.source.stack] if setting.source.stack else [])])
+
+
+def _summaries(screening: Screening) -> tuple[DriverSummary, DriverSummary]:
+    return summary_of(screening.ads, screening.sumo_driver), summary_of(screening.sumo_driver, screening.sumo_driver)
+
+
+def _violation(trip: TripResult, one: Judged, setting: Setting, driver: str) -> Json:
+    is_ads = driver == "ads"
+    return {
+        "driver": driver,
+        "ego": trip.ego,
+        "oracle": one.oracle,
+        **violation_json(one.violation),
+        "fault": one.fault.value,
+        "reason": one.reason,
+        "alone": one.is_alone,
+        "command": command(setting, trip.ego) if is_ads else None,
+    }
+
+
+def _trip(result: TripResult) -> Json:
+    return {name: value for name, value in msgspec.to_builtins(result).items() if name not in ("ego", "violations")}
+
+
+def _line(trip: TripResult, one: Judged, setting: Setting) -> str:
+    by = one.fault.value + (f": {one.reason}" if one.reason else "")
+    violation = one.violation
+    return (
+        f"{violation.kind} of {trip.ego} at {violation.time:.1f} s: {violation.detail} "
+        f"(by the {by}; alone: {_ALONE[one.is_alone]})\n    {command(setting, trip.ego)}"
+    )
+
+
+def _by_oracle(ads: DriverSummary, sumo: DriverSummary) -> list[list[str]]:
+    rows = []
+    for kind in ads.by_oracle:
+        row = [_named(kind, ads.by_oracle[kind].kinds.keys() | sumo.by_oracle[kind].kinds.keys())]
+        for one in (ads.by_oracle[kind], sumo.by_oracle[kind]):
+            others, simulator = one.by_fault["other"], one.by_fault["simulator"]
+            row += [_rate(one.per_1000_km, 0), _rate(one.per_100_trips, 1), f"({others}, {simulator})"]
+        rows.append(row)
+    return rows
+
+
+def _named(oracle: str, kinds: Collection[str]) -> str:
+    """An oracle with those of its kinds that have other names."""
+    others = sorted(set(kinds) - {oracle})
+    return f"{oracle} (with {', '.join(others)})" if others else oracle
+
+
+def _share(share: Share) -> str:
+    return f"{share.count}/{share.total} = {share.value:.1%} [{share.low:.1%}, {share.high:.1%}]"
+
+
+def _rate(rate: Rate, digits: int) -> str:
+    if rate.value is None:
+        return "-"
+    return f"{rate.value:.{digits}f} [{rate.low:.{digits}f}, {rate.high:.{digits}f}]"
+
+
+def _range(values: Quartiles) -> str:
+    if values.median is None:
+        return "-"
+    return f"{values.median:.2f} [{values.low:.2f}, {values.high:.2f}] of {values.count}"
+
+
+_ROWS: Sequence[tuple[str, Callable[[DriverSummary], str]]] = (
+    ("trips driven", lambda one: str(one.trips)),
+    ("completed", lambda one: _share(one.completed)),
+    ("km", lambda one: f"{one.km:.1f}"),
+    ("at-fault collisions", lambda one: str(one.at_fault_collisions)),
+    ("at-fault violations", lambda one: str(one.at_fault_violations)),
+    ("per 1 000 km", lambda one: _rate(one.violations_per_1000_km, 0)),
+    ("per 100 trips", lambda one: _rate(one.violations_per_100_trips, 1)),
+    ("by others", lambda one: str(one.others_fault_violations)),
+    ("by the simulator", lambda one: str(one.simulator_violations)),
+    ("travel time / SUMO's driver, median [quartiles]", lambda one: _range(one.travel_time_ratio)),
+    ("hard braking per 100 km", lambda one: _rate(one.hard_brakings_per_100_km, 1)),
+    ("least time to collision [s], median [quartiles]", lambda one: _range(one.least_ttc)),
+    ("trips with one below 1 s", lambda one: _share(one.ttc_below["1"])),
+    ("below 2 s", lambda one: _share(one.ttc_below["2"])),
+    ("below 3 s", lambda one: _share(one.ttc_below["3"])),
+)
+
+
+def _table(rows: Sequence[Sequence[str]]) -> str:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    )

@@ -1,0 +1,175 @@
+"""Which trips are driven: a stratified, seeded draw from the scenario's own departures."""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Sequence
+
+import msgspec
+
+from dvca_sumo.engine.replay import roadmap
+from dvca_sumo.geometry.randomness import key_of, uniforms
+from dvca_sumo.roadmap import RouteError
+from dvca_sumo.run import Departing, free_flow, opened
+from dvca_sumo.scenario import Scenario, ScenarioError
+from dvca_sumo.stack.reference import reference_stack
+from dvca_sumo.world import CARS, Entry, World
+
+SHORTEST = 300.0  # [m] of a trip
+FREE_FLOW, MARGIN = 1.5, 60.0  # so many times its free-flow time and so many seconds, and a trip must be over
+LONGEST_WINDOW = 7200.0  # [s] of departures that are looked at where nothing says when the scenario ends
+
+_STREAM = 201
+_WINDOWS = 10  # of departure time
+_CELLS = 4  # by so many the area is divided
+
+
+class Trip(msgspec.Struct, frozen=True):
+    """One vehicle's trip, as SUMO's own traffic makes it."""
+
+    ego: str
+    departs: float  # [s]
+    length: float  # [m]
+    free_flow: float  # [s] at the speed limits
+    expected: float  # [s] that SUMO's driver took in the plain traffic; from free flow where it had not arrived
+
+
+class Draw(msgspec.Struct, frozen=True):
+    """The trips drawn, by departure, and what the others were."""
+
+    trips: tuple[Trip, ...]
+    departures: int
+    refused: dict[str, int]  # reason -> departures, of those that were looked at
+
+
+class _Departure(msgspec.Struct, frozen=True):
+    entry: Entry
+    cells: tuple[tuple[int, int], tuple[int, int]]  # where it begins and ends
+    window: int
+    draw: float  # from 0 to 1
+
+
+def drawn(scenario: Scenario, count: int) -> Draw:
+    """Draw `count` trips, or as many as there are, in this process: one run of SUMO without any ADS.
+
+    A trip is drivable when the vehicle is of a car's class, has no stops of its own, `--ego` accepts its name,
+    its route is at least `SHORTEST` long and can be driven on the map, and it would be over before the
+    scenario's end. The draw goes round the time windows; in each the trip is taken that begins and ends where
+    fewest of those taken before do, among equals the first by a draw keyed by the vehicle's name.
+
+    Raises:
+        ScenarioError: SUMO refuses the scenario, or no trip is drivable.
+    """
+    departing = Departing(scenario, lambda name: roadmap(scenario.configuration.net, name), reference_stack)
+    with opened(scenario) as world:
+        entries, durations, refused = _departures(scenario, world, departing)
+    trips: list[Trip] = []
+    end = math.inf if scenario.end is None else scenario.end
+
+    def is_taken(entry: Entry) -> bool:
+        trip = _trip(entry, departing, durations.get(entry.ego))
+        if isinstance(trip, str):
+            refused[trip] += 1
+        elif entry.time + FREE_FLOW * trip.free_flow + MARGIN > end:
+            refused["not over before the end"] += 1
+        else:
+            trips.append(trip)
+        return trips[-1:] == [trip]
+
+    departures = sum(refused.values()) + len(entries)
+    _spread(_placed(scenario, entries), count, is_taken)
+    if not trips:
+        reasons = ", ".join(f"{number} {reason}" for reason, number in refused.most_common())
+        raise ScenarioError(
+            f"no trip to drive among {departures} departures from {scenario.begin:g} s on ({reasons or 'none at all'})"
+        )
+    trips.sort(key=lambda trip: (trip.departs, trip.ego))
+    return Draw(tuple(trips), departures, dict(refused))
+
+
+def _departures(
+    scenario: Scenario, world: World, departing: Departing
+) -> tuple[list[Entry], dict[str, float], Counter[str]]:
+    entries: dict[str, Entry] = {}
+    durations: dict[str, float] = {}
+    refused: Counter[str] = Counter()
+    end = scenario.begin + LONGEST_WINDOW if scenario.end is None else scenario.end
+    while world.time < end and not world.is_exhausted:
+        world.advance()
+        for name in world.departed():
+            vehicle_class = world.class_of(name)
+            if vehicle_class not in CARS:
+                refused[f"of class {vehicle_class}"] += 1
+            elif world.has_stops(name):
+                refused["with stops of their own"] += 1
+            elif not departing.definitions.has(name):
+                refused["not named in the scenario's files"] += 1
+            else:
+                entries[name] = departing.entry(name, world)
+        for name in world.arrived():
+            if name in entries:
+                durations[name] = world.time - entries[name].time
+    return list(entries.values()), durations, refused
+
+
+def _trip(entry: Entry, departing: Departing, duration: float | None) -> Trip | str:
+    """The trip, or why it is none."""
+    try:
+        route = departing.route(entry)
+    except (RouteError, KeyError):
+        return "without a drivable route"
+    length = route.destination - route.start
+    if length < SHORTEST:
+        return f"shorter than {SHORTEST:g} m"
+    freely = free_flow(route)
+    return Trip(entry.ego, entry.time, length, freely, FREE_FLOW * freely if duration is None else duration)
+
+
+def _placed(scenario: Scenario, entries: Sequence[Entry]) -> list[_Departure]:
+    """Each departure with its stratum; edges are where their first lane has its middle."""
+    if not entries:
+        return []
+    lanes = roadmap(scenario.configuration.net, "passenger").lanes
+
+    def middle(edge: str) -> tuple[float, float]:
+        points = lanes[f"{edge}_0"].line.points
+        return float(points[:, 0].mean()), float(points[:, 1].mean())
+
+    places = [(middle(entry.edges[0]), middle(entry.edges[-1])) for entry in entries]
+    xs, ys = ([place[axis] for pair in places for place in pair] for axis in (0, 1))
+    times = [entry.time for entry in entries]
+
+    def cell(place: tuple[float, float]) -> tuple[int, int]:
+        return _part(place[0], xs, _CELLS), _part(place[1], ys, _CELLS)
+
+    draws = uniforms(scenario.seed, _STREAM, 0, [key_of(entry.ego) for entry in entries], 1)[:, 0].tolist()
+    return [
+        _Departure(entry, (cell(start), cell(end)), _part(entry.time, times, _WINDOWS), draw)
+        for entry, (start, end), draw in zip(entries, places, draws, strict=True)
+    ]
+
+
+def _part(value: float, values: Sequence[float], parts: int) -> int:
+    """Which of so many equal parts of the range of `values` it is in."""
+    low, high = min(values), max(values)
+    return min(int(parts * (value - low) / (high - low)), parts - 1) if high > low else 0
+
+
+def _spread(departures: Sequence[_Departure], count: int, is_taken: Callable[[Entry], bool]) -> None:
+    """Offer departures, evenly spread over time and space, until so many are taken."""
+    windows = [[one for one in departures if one.window == window] for window in range(_WINDOWS)]
+    used: list[Counter[tuple[int, int]]] = [Counter(), Counter()]
+
+    def crowding(one: _Departure) -> tuple[int, float, str]:
+        return sum(counter[cell] for counter, cell in zip(used, one.cells, strict=True)), one.draw, one.entry.ego
+
+    left = count
+    while left and any(windows):
+        for window in windows:
+            while left and window:
+                best = min(window, key=crowding)
+                window.remove(best)
+                if is_taken(best.entry):
+                    left -= 1
+                    for counter, cell in zip(used, best.cells, strict=True):
+                        counter[cell] += 1
+                    break

@@ -1,0 +1,92 @@
+"""The vehicles that are judged: egos, moved by their own stacks, and natives, moved by SUMO's own drivers."""
+
+import math
+
+import numpy as np
+
+from dvca_sumo.geometry.angles import wrapped
+from dvca_sumo.messages import VehicleShape
+from dvca_sumo.roadmap import Route
+from dvca_sumo.truth import EgoTruth
+from dvca_sumo.world.session import Entry, Motion
+from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
+
+
+def shape_of(entry: Entry) -> VehicleShape:
+    """The body of an ego of which SUMO knows length and width only: axles at 18 % and 78 % of its length."""
+    return VehicleShape(entry.length, entry.width, 0.6 * entry.length, 0.18 * entry.length)
+
+
+class Ego:
+    """One ego's body in the world; between two world steps its `vehicle` is advanced by its own stack."""
+
+    def __init__(self, entry: Entry, route: Route, limits: VehicleLimits) -> None:
+        self.name = entry.ego
+        self.route = route
+        self.shape = shape_of(entry)
+        axle = np.array([entry.front_x, entry.front_y]) - self.shape.front * np.array(
+            [np.cos(entry.heading), np.sin(entry.heading)]
+        )
+        start = EgoTruth(entry.time, float(axle[0]), float(axle[1]), entry.heading, entry.speed, 0.0, 0.0, 0.0)
+        self.vehicle = Vehicle(self.shape, limits, start)
+        self.signals = _signals(route)  # ids of the signal heads on its route
+        self._station, self._station_time = route.start - self.shape.front, -1.0
+
+    @property
+    def truth(self) -> EgoTruth:
+        """Its true motion now."""
+        return self.vehicle.truth
+
+    def station(self) -> float:
+        """Where its rear axle is along the route [m]; asked for once a world step at least."""
+        truth = self.vehicle.truth
+        if truth.time != self._station_time:
+            window = (self._station - 20.0, self._station + 30.0)
+            self._station = self.route.line.station(truth.x, truth.y, between=window)
+            self._station_time = truth.time
+        return self._station
+
+    def lane(self) -> str:
+        """The route's lane under its front bumper, for SUMO's map matching."""
+        line = self.route.line
+        front = min(self.station() + self.shape.front, line.length)
+        return self.route.lane_ids[int(line.stations.searchsorted(front, side="right")) - 1]
+
+
+class Native:
+    """A vehicle that SUMO's own driver drives, as oracles see an ego: the pose is that of the rear axle."""
+
+    def __init__(self, entry: Entry, route: Route) -> None:
+        self.name = entry.ego
+        self.route = route
+        self.shape = shape_of(entry)
+        self.signals = _signals(route)
+        self.edges = entry.edges
+        self.truth = self._seen(
+            entry.time,
+            Motion(entry.front_x, entry.front_y, entry.heading, entry.speed, 0.0, is_on_road=True, edges=entry.edges),
+            entry.heading,
+            1.0,
+        )
+
+    def follow(self, time: float, motion: Motion) -> None:
+        """Take over how it moves at `time` [s]."""
+        if time > self.truth.time:
+            self.truth = self._seen(time, motion, self.truth.heading, time - self.truth.time)
+
+    def _seen(self, time: float, motion: Motion, before: float, passed: float) -> EgoTruth:
+        front, heading = self.shape.front, motion.heading
+        return EgoTruth(
+            time=time,
+            x=motion.front_x - front * math.cos(heading),
+            y=motion.front_y - front * math.sin(heading),
+            heading=wrapped(heading),
+            speed=motion.speed,
+            acceleration=motion.acceleration,
+            yaw_rate=wrapped(heading - before) / passed,
+            steering=0.0,
+        )
+
+
+def _signals(route: Route) -> tuple[str, ...]:
+    return tuple(line.signal_id for line in route.stop_lines if line.signal_id is not None)

@@ -1,0 +1,140 @@
+"""What is measured, and what is told apart: the simulator's doing, the other one's, the driver's."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from screen_scenes import LANE_Y, Row, cruise, moment, places
+
+from dvca_sumo.oracles.collision import Collision
+from dvca_sumo.oracles.speed_limit import SpeedLimit
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.screen.disturbances import Disturbances
+from dvca_sumo.screen.judging import Fault, judged
+from dvca_sumo.screen.measures import Measures
+from dvca_sumo.thresholds import Thresholds
+from dvca_sumo.truth import Moment
+from dvca_sumo.violations import Ending
+
+
+@pytest.fixture(scope="module")
+def roads(street: Path) -> RoadMap:
+    return RoadMap.load(street)
+
+
+def measured(moments: Sequence[Moment], roads: RoadMap) -> Measures:
+    found = Measures(places(roads), Thresholds())
+    for one in moments:
+        found.see(one)
+    return found
+
+
+def disturbances(moments: Sequence[Moment], roads: RoadMap) -> list[tuple[str, str]]:
+    found = Disturbances(places(roads))
+    for one in moments:
+        found.see(one)
+    return [(one.object, one.how) for one in found.found]
+
+
+def at_contact(moments: Sequence[Moment], roads: RoadMap) -> list[tuple[str, Fault]]:
+    """Kinds and faults of a drive that ends with the last of `moments`."""
+    where = places(roads)
+    oracle, watch = Collision(where, Thresholds()), Disturbances(where)
+    for one in moments:
+        oracle.observe(one)
+        watch.see(one)
+    found = judged([oracle.conclude(Ending.CUT)], watch, moments[-1], roads)
+    return [(one.violation.kind, one.fault) for one in found]
+
+
+def test_way_and_time_are_those_of_the_drive(roads: RoadMap) -> None:
+    found = measured(cruise(5.0, 10.0), roads)
+    assert found.distance == pytest.approx(50.0)
+    assert found.duration == pytest.approx(5.0)
+    assert (found.hard_brakings, found.least_ttc) == (0, None)
+
+
+def test_each_episode_of_hard_braking_counts_once(roads: RoadMap) -> None:
+    speeds = [12.0, 12.0, 11.6, 11.2, 10.8, 10.8, 10.4, 10.1, 9.8]  # 4 m/s^2, nothing, 4 m/s^2, then 3 m/s^2
+    moments = [moment(0.1 * k, 40.0 + k, speed) for k, speed in enumerate(speeds)]
+    assert measured(moments, roads).hard_brakings == 2
+
+
+def test_the_least_time_to_collision_is_one_that_lasted(roads: RoadMap) -> None:
+    lead: Row = ("lead", (40.0 + 20.0 + 2.3, LANE_Y), 0.0)
+    found = measured(cruise(1.0, 10.0, [lead]), roads)
+    assert found.least_ttc == pytest.approx(1.2)  # 1.0 s at last, 1.2 s two moments before
+    seen_twice = [*cruise(0.2, 10.0), *[moment(0.3 + 0.1 * k, 43.0 + k, 10.0, [lead]) for k in range(2)]]
+    assert measured(seen_twice, roads).least_ttc is None
+
+
+def test_a_body_that_appears_within_braking_distance_is_the_simulators_doing(roads: RoadMap) -> None:
+    before = cruise(1.0, 12.0)
+    near, far = ("new", (52.0 + 10.0, LANE_Y), 0.0), ("new", (52.0 + 60.0, LANE_Y), 0.0)
+    assert disturbances([*before, moment(1.1, 53.2, 12.0, [near])], roads) == [("new", "appeared")]
+    assert disturbances([*before, moment(1.1, 53.2, 12.0, [far])], roads) == []
+    fleeing = ("new", (52.0 + 10.0, LANE_Y), 12.0)
+    assert disturbances([*before, moment(1.1, 53.2, 12.0, [fleeing])], roads) == []
+
+
+def test_a_body_that_jumps_into_the_way_is_and_one_that_drives_there_is_not(roads: RoadMap) -> None:
+    beside: Row = ("car", (58.0, LANE_Y + 3.2), 4.0)
+    into: Row = ("car", (58.4, LANE_Y), 4.0)
+    assert disturbances([moment(0.0, 50.0, 12.0, [beside]), moment(0.1, 51.2, 12.0, [into])], roads) == [
+        ("car", "jumped")
+    ]
+    slowly = [
+        moment(0.1 * k, 50.0 + 1.2 * k, 12.0, [("car", (62.0 + 0.4 * k, LANE_Y + 3.2 - 0.3 * k), 4.0)])
+        for k in range(8)
+    ]
+    assert disturbances(slowly, roads) == []
+
+
+def test_a_jump_behind_or_far_beside_changes_nothing(roads: RoadMap) -> None:
+    for x, y in ((20.0, LANE_Y), (60.0, LANE_Y + 9.6)):
+        jump = [moment(0.1 * k, 50.0 + k, 10.0, [("car", (x + 5.0 * k, y), 4.0)]) for k in range(3)]
+        assert disturbances(jump, roads) == []
+
+
+def test_a_contact_with_what_was_inserted_is_counted_apart(roads: RoadMap) -> None:
+    inserted: Row = ("new", (56.0, LANE_Y), 0.0)
+    moments = [*cruise(1.0, 12.0), *[moment(1.1 + 0.1 * k, 52.4 + 1.2 * k, 12.0, [inserted]) for k in range(3)]]
+    assert at_contact(moments, roads) == [("collision", Fault.SIMULATOR)]
+
+
+def test_running_into_a_standing_car_is_the_drivers(roads: RoadMap) -> None:
+    assert at_contact(cruise(2.0, 10.0, [("lead", (60.0, LANE_Y), 0.0)])[:19], roads) == [("collision", Fault.DRIVER)]
+
+
+def test_being_run_into_from_behind_is_the_others_unless_the_ego_left_its_lane(roads: RoadMap) -> None:
+    def hit(y: float) -> list[Moment]:
+        return [moment(0.1 * k, 60.0 + 0.5 * k, 5.0, [("tail", (50.0 + 1.5 * k, y), 15.0)], y=y) for k in range(6)]
+
+    assert at_contact(hit(LANE_Y), roads) == [("collision", Fault.OTHER)]
+    assert at_contact(hit(LANE_Y + 1.6), roads) == [("collision", Fault.DRIVER)]
+
+
+def test_a_standing_ego_is_never_at_fault(roads: RoadMap) -> None:
+    moments = [moment(0.1 * k, 60.0, 0.0, [("tail", (50.0 + 1.5 * k, LANE_Y), 15.0)]) for k in range(6)]
+    assert at_contact(moments, roads) == [("collision", Fault.OTHER)]
+
+
+@pytest.mark.parametrize(("front", "fault"), [(60.0, Fault.OTHER), (202.0, Fault.DRIVER)])
+def test_a_touched_flank_is_the_others_in_the_egos_lane_and_not_on_a_junction(
+    roads: RoadMap, front: float, fault: Fault
+) -> None:
+    where = [(front - 4.0 + 0.5 * k, LANE_Y + 3.0 - 0.35 * k) for k in range(8)]
+    moments = [moment(0.1 * k, front + 0.5 * k, 5.0, [("side", place, 5.0)]) for k, place in enumerate(where)]
+    touching = next(k for k, (_, y) in enumerate(where) if y - LANE_Y <= 1.8)
+    assert at_contact(moments[: touching + 1], roads)[-1] == ("collision", fault)
+
+
+def test_traffic_rules_are_always_the_drivers(roads: RoadMap) -> None:
+    where = places(roads)
+    oracle, watch = SpeedLimit(where, Thresholds()), Disturbances(where)
+    moments = cruise(2.0, 20.0)
+    for one in moments:
+        oracle.observe(one)
+        watch.see(one)
+    (found,) = judged([oracle.conclude(Ending.CUT)], watch, moments[-1], roads)
+    assert (found.oracle, found.fault, found.is_alone) == ("speed_limit", Fault.DRIVER, None)

@@ -1,0 +1,149 @@
+"""A whole screening: what it says, keeps, and goes on from."""
+
+import json
+import shlex
+from pathlib import Path
+
+import pytest
+from command_line import assert_one_error, typed
+from screen_scenes import traffic
+
+from dvca_sumo.scenario import Scenario
+from dvca_sumo.screen.driving import Driven
+from dvca_sumo.screen.judging import Fault, Judged
+from dvca_sumo.screen.results import Outcome, TripResult
+from dvca_sumo.screen.screening import Progress, Screening, Setting, Stores, excused, screened
+from dvca_sumo.screen.summary import summary_of
+from dvca_sumo.screen.tables import has_failed, has_gaps, json_of, terminal_text
+from dvca_sumo.screen.trips import Draw
+from dvca_sumo.stack.sources import StackSource
+from dvca_sumo.store import Store
+from dvca_sumo.violations import Category, Violation
+
+ROUTES = """<vType id="bus" vClass="bus"/>
+<trip id="first" from="ab" to="bc" depart="1" departPos="last"/>
+<trip id="second" from="ab" to="bc" depart="6" departPos="last"/>"""
+
+
+class Heard(Progress):
+    """Counts simulations."""
+
+    def __init__(self) -> None:
+        self.simulations = 0
+
+    def over(self, left: int) -> None:  # noqa: ARG002
+        self.simulations += 1
+
+
+def screening_of(
+    scenario: Scenario, stack: str | None = None, folder: Path | None = None, progress: Progress | None = None
+) -> Screening:
+    setting = Setting(scenario, None, 3, 5, StackSource(stack))
+    stores = Stores()
+    if folder is not None:
+        stores = Stores(Store(folder / "draws.jsonl", Draw), Store(folder / "simulations.jsonl", Driven))
+    return screened(setting, 2, stores, progress or Progress())
+
+
+@pytest.fixture(scope="module")
+def reckless(tmp_path_factory: pytest.TempPathFactory, street: Path) -> Screening:
+    """Two egos at full throttle: too fast at least."""
+    return screening_of(traffic(tmp_path_factory.mktemp("reckless"), street, ROUTES), "small_stacks:full_throttle")
+
+
+def test_the_healthy_stack_is_clean_and_goes_on_from_what_was_kept(tmp_path: Path, street: Path) -> None:
+    scenario = traffic(tmp_path, street, ROUTES)
+    heard, again = Heard(), Heard()
+    screening = screening_of(scenario, folder=tmp_path / "kept", progress=heard)
+    assert not has_failed(screening)
+    assert not has_gaps(screening)
+    ads = summary_of(screening.ads, screening.sumo_driver)
+    assert (ads.trips, ads.completed.count, ads.at_fault_violations) == (2, 2, 0)
+    assert ads.travel_time_ratio.count == 2
+    assert 0.8 < (ads.travel_time_ratio.median or 0.0) < 1.8
+    assert heard.simulations == 3
+    assert json_of(screening_of(scenario, folder=tmp_path / "kept", progress=again)) == json_of(screening)
+    assert again.simulations == 0
+
+
+def test_what_is_said_as_data(reckless: Screening) -> None:
+    said = json.loads(json.dumps(json_of(reckless), allow_nan=False))
+    assert said["schema"] == 1
+    for driver in ("ads", "sumo_driver"):
+        wanted = {"trips", "completed", "km", "at_fault_collisions", "at_fault_violations", "by_oracle"}
+        assert wanted | {"travel_time_ratio"} <= set(said[driver])
+        assert {"collision", "ttc", "speed_limit", "no_progress"} <= set(said[driver]["by_oracle"])
+    assert said["ads"]["at_fault_violations"] > 0
+    assert said["ads"]["by_oracle"]["speed_limit"]["trips"]["count"] > 0
+    assert said["sumo_driver"]["completed"]["count"] == 2
+    assert said["draw"] == {"departures": 2, "refused": {}, "drawn": 2}
+
+
+def test_each_violation_comes_with_a_command_that_reproduces_it(
+    reckless: Screening, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[1]))  # where the stack is
+    assert has_failed(reckless)
+    found = [one for one in json_of(reckless)["violations"] if one["driver"] == "ads"]  # type: ignore[attr-defined]
+    assert found
+    assert {one["alone"] for one in found} <= {True, False}
+    chosen = next(one for one in found if one["kind"] == "speed_limit" and one["alone"])
+    program, *words = shlex.split(chosen["command"])
+    assert program == "dvca-sumo"
+    assert words[:4] == ["run", str(reckless.setting.scenario.configuration.path), "--ego", chosen["ego"]]
+    said = typed(*words, "--json")
+    assert chosen["kind"] in {one["kind"] for one in said.result["violations"]}, said.err
+    assert chosen["command"] in terminal_text(reckless)
+
+
+def test_the_text_puts_both_drivers_side_by_side(reckless: Screening) -> None:
+    text = terminal_text(reckless)
+    assert "SUMO's driver" in text
+    assert "alone: yes" in text
+    assert "2 trips drawn of 2 departures (no more than that of 3 asked for)" in text
+
+
+def test_a_mesoscopic_scenario_is_refused(tmp_path: Path, street: Path) -> None:
+    with pytest.raises(Exception, match="mesoscopic"):
+        traffic(tmp_path, street, mesosim="true")
+
+
+def test_a_scenario_without_a_way_for_cars_is_refused_in_one_line(tmp_path: Path, street: Path) -> None:
+    rails = tmp_path / "rails.net.xml"
+    rails.write_text(street.read_text().replace('speed="13.90"', 'allow="rail" speed="13.90"'))
+    scenario = traffic(
+        tmp_path / "rail", rails, '<vType id="r" vClass="rail"/><trip id="t" type="r" from="ab" to="bc" depart="0"/>'
+    )
+    said = typed("screen", scenario.configuration.path)
+    assert_one_error(said, 3, "no lane for cars", "rails.net.xml")
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "says"),
+    [
+        (("--egos", "0"), 2, "egos"),
+        (("--end", "-4"), 3, "end is no time"),
+        (("--stack", "nowhere:stack"), 3, "nowhere:stack"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(
+    tmp_path: Path, street: Path, words: tuple[str, ...], code: int, says: str
+) -> None:
+    scenario = traffic(tmp_path, street, ROUTES)
+    assert_one_error(typed("screen", scenario.configuration.path, *words), code, says)
+
+
+def test_a_destination_is_excused_only_where_sumos_driver_was_held_up_as_long(reckless: Screening) -> None:
+    destination = Violation(
+        "destination_not_reached", Category.MISSION, 99.0, None, (0.0, 0.0), None, 40.0, 3.0, "40.0 m short"
+    )
+    late = TripResult(
+        "ego",
+        Outcome.TIME_OVER,
+        duration=100.0,
+        violations=(Judged("destination", destination, Fault.DRIVER, ""),),
+    )
+    for taken, fault in ((99.0, Fault.DRIVER), (101.0, Fault.OTHER)):
+        native = TripResult("ego", Outcome.ARRIVED, duration=taken)
+        assert [one.fault for one in excused(late, native).violations] == [fault]
+    assert all(result == excused(result, result) for result in reckless.ads)
