@@ -2,7 +2,7 @@
 
 Any ideal component may prevent a violation by luck, if it begins early enough: the ego is a little
 elsewhere by then. The one at fault can prevent it until the last moment at which anything can. A
-substitute upstream has gone through all components after it within `LATENCY`; so the responsible
+substitute upstream has gone through all components after it within a latency; so the responsible
 component is the most upstream of those whose last chance is not earlier than that before the latest.
 
 Where even that lies more than `PROMPT` before the violation, it is asked as well whether all four,
@@ -19,6 +19,9 @@ from dvca_sumo.messages import Component
 from dvca_sumo.record import Record
 
 LATENCY = 0.15  # [s] a cycle of the components that run ten times a second, and a half
+# [s] with jitter: besides, a cycle of drawn phases for each component in between, and a state's length at the
+# beginning of either substitution, which runs enter at different moments.
+LATENCY_OF_STATES = 0.6
 PROMPT = 2.5  # [s]
 
 
@@ -40,7 +43,8 @@ def decisive(
     seen = {component}
     while True:
         messages = violation_inducing_message(dtest, record, component, time, until, is_exact=is_exact)
-        later = _later(dtest, record, answer, component, messages.last_safe.time, time)
+        latency = LATENCY if is_exact else LATENCY_OF_STATES
+        later = _later(dtest, record, answer, component, (messages.last_safe.time, latency), time)
         rival = next((one for one in later if one not in seen), None)
         if rival is None:
             return component, messages
@@ -56,20 +60,20 @@ def is_by_luck(dtest: Dtest, messages: MessageAnswer, time: float) -> bool:
 
 
 def _later(
-    dtest: Dtest, record: Record, answer: ComponentAnswer, component: Component, chance: float, time: float
+    dtest: Dtest, record: Record, answer: ComponentAnswer, component: Component, last: tuple[float, float], time: float
 ) -> Iterator[Component]:
-    """Components that could have prevented it later than `component`, whose last chance was at `chance` [s].
+    """Components that could have prevented it later than `component`; `last`: its last chance, and the latency [s].
 
-    Those upstream count as later up to `LATENCY` earlier. One that was not enough from where all were
+    Those upstream count as later up to the latency earlier. One that was not enough from where all were
     asked is not asked after that again.
     """
-    place = SUBSTITUTABLE.index(component)
+    place, (chance, latency) = SUBSTITUTABLE.index(component), last
     for other in SUBSTITUTABLE[:place]:
-        is_open = answer.singles[other] is not Outcome.SAFE and chance - LATENCY < answer.since
-        if is_open and _is_enough(dtest, record, other, chance - LATENCY, time):
+        is_open = answer.singles[other] is not Outcome.SAFE and chance - latency < answer.since
+        if is_open and _is_enough(dtest, record, other, chance - latency, time):
             yield other
     for other in SUBSTITUTABLE[place + 1 :]:
-        if answer.singles[other] is Outcome.SAFE and _is_enough(dtest, record, other, chance + LATENCY, time):
+        if answer.singles[other] is Outcome.SAFE and _is_enough(dtest, record, other, chance + latency, time):
             yield other
 
 

@@ -1,7 +1,7 @@
 """Stacks for tests of the fork engine, as `--stack forking_stacks:NAME` finds them.
 
-Messages carry no sign of being substituted, but ids of ideally perceived objects are far larger than
-track numbers: planning can tell by them, and do what the stack is named after.
+Messages carry no sign of being substituted, but ideally perceived vehicles have SUMO's default size to the
+last bit, which measured ones never have: planning can tell by it, and do what the stack is named after.
 """
 
 import ctypes
@@ -24,7 +24,7 @@ from dvca_sumo.messages import ControlCommand, LocalizationEstimate, PredictedOb
 from dvca_sumo.stack.protocols import Planning
 from dvca_sumo.stack.reference import Stack, StackContext, reference_stack
 
-_LARGEST_TRACK_NUMBER = 100_000
+_DEFAULT_SIZE = (5.0, 1.8)  # [m]
 _PR_SET_PDEATHSIG = 1
 
 told = -1  # descriptor that the stacks write into, set by a test
@@ -40,8 +40,7 @@ class OnIdeal:
     def step(
         self, localization: LocalizationEstimate, predicted: PredictedObjects, signals: dict[str, SignalColour]
     ) -> Trajectory:
-        ids = predicted.objects.ids
-        if len(ids) > 0 and max(ids) > _LARGEST_TRACK_NUMBER:
+        if (predicted.objects.boxes[:, 3:5] == _DEFAULT_SIZE).all(axis=1).any():
             self._act()
         return self._planning.step(localization, predicted, signals)
 
