@@ -19,7 +19,7 @@ For each fault type and scenario:
 3. its start later and its end earlier by bisection, in turn, until no step later or shorter still counts;
    then the window grown by one step at either end, where that still counts;
 4. the same fault for the same time in another moment, the first at which it alters at least half as many
-   messages and nothing is violated; where there is none, for half the time, and so on.
+   messages and nothing is violated, in jitter mode neither; where there is none, for half the time, and so on.
 
 Nothing is attributed. Writes dvca_sumo/bench/injected.toml after each instance; those that it holds already are
 not searched again unless named by --only.
@@ -225,9 +225,13 @@ class Ground:
         """How many messages it alters."""
         return self._driven(trial, StopRule(at=self._departed + trial.end))[1]
 
-    def _driven(self, trial: Trial, stop: StopRule) -> tuple[list[Violation], int]:
+    def is_clean_with_jitter(self, trial: Trial) -> bool:
+        """Whether nothing is violated either when phases and noise are drawn."""
+        return not self._driven(trial, StopRule(), jitter=0)[0]
+
+    def _driven(self, trial: Trial, stop: StopRule, jitter: int | None = None) -> tuple[list[Violation], int]:
         self.drives += 1
-        ((_, answer),) = isolated([partial(_drive, self._scenario, trial.text, stop)], 1, 600.0)
+        ((_, answer),) = isolated([partial(_drive, self._scenario, trial.text, stop, jitter)], 1, 600.0)
         if isinstance(answer, Failure):
             raise SystemExit(f"{self.name} {trial.text}: {answer.reason}\n{answer.said}")
         return answer
@@ -246,8 +250,8 @@ class Ground:
         return last.time - self._departed if is_meant else None
 
 
-def _drive(scenario: Scenario, fault: str, stop: StopRule) -> tuple[list[Violation], int]:
-    task = Task(scenario, (planted_fault(fault),), stop)
+def _drive(scenario: Scenario, fault: str, stop: StopRule, jitter: int | None) -> tuple[list[Violation], int]:
+    task = Task(scenario, (planted_fault(fault),), stop, jitter=jitter)
     record = rtest(task, partial(roadmap, scenario.configuration.net), reference_stack)
     return record.violations, sum(map(len, record.altered.values()))
 

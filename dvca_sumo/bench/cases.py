@@ -1,5 +1,6 @@
 """The cases of the benchmark: a scenario, the defect in it, and the component that holds the defect."""
 
+import re
 import shlex
 import tomllib
 from collections import Counter
@@ -12,6 +13,9 @@ import msgspec
 from dvca_sumo.messages import Component
 
 Suite = Literal["injected", "real-bugs", "random"]
+
+JITTER_MARGIN = 0.7  # [s] how much earlier or later the same comes in a drive with other phases and noise
+_WINDOW = re.compile(r"(start|end)=([0-9.]+)")
 
 _FOLDER = Path(__file__).resolve().parent
 INJECTED = _FOLDER / "injected.toml"
@@ -35,6 +39,10 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     harmless_scenario: str = ""  # that the bug does nothing to; empty for a fault
     ego: str | None = None  # None: the scenario's own
     begin: float | None = None  # [s] of the simulation; None: the scenario's own
+
+    def loosened(self) -> "Case":
+        """The same for jitter mode: a fault's window is longer at either end by what phases and noise shift a drive."""
+        return msgspec.structs.replace(self, fault=_loosened(self.fault))
 
     def command(self, seed: int, *, has_jitter: bool) -> str:
         """What to type to see this case alone."""
@@ -84,6 +92,14 @@ def cases_in(path: Path, suite: Suite) -> tuple[Case, ...]:
     if count > 1:
         raise CasesError(f"{path} has {count} cases {name!r}")
     return tuple(sorted(cases, key=lambda case: case.name))
+
+
+def _loosened(fault: str) -> str:
+    def moved(found: re.Match[str]) -> str:
+        by = -JITTER_MARGIN if found[1] == "start" else JITTER_MARGIN
+        return f"{found[1]}={max(float(found[2]) + by, 0.0):g}"
+
+    return _WINDOW.sub(moved, fault)
 
 
 def _case(table: object, suite: Suite, where: str) -> Case:
