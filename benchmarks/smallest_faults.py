@@ -399,7 +399,8 @@ def harmless(ground: Ground, harmful: Trial, altered: int) -> Trial:
     while length > 0:
         for start in ground.moments():
             trial = msgspec.structs.replace(harmful, start=start, end=_grid(_steps(start) + length))
-            if ground.altered(trial) >= least and ground.whole(trial)[1]:
+            is_enough = ground.altered(trial) >= least
+            if is_enough and ground.whole(trial)[1] and ground.is_clean_with_jitter(trial):
                 return trial
         length, least = length // 2, 0.5 * least
     raise NotFoundError(f"{harmful.text} is harmless in {ground.name} at no other moment")
