@@ -236,7 +236,7 @@ def _decided(found: Attribution, dtest: Dtest, engine: Engine, *, is_exact: bool
     assert answer is not None  # the caller has it
     assert violation is not None
     component, messages = decisive(dtest, record, answer, violation.time, found.until, is_exact=is_exact)
-    if is_by_luck(dtest, messages, violation.time):
+    if is_by_luck(dtest, record, component, messages, violation.time):
         answer = concluded(Outcome.VIOLATES, answer.singles, answer.since)
         return _planning_message(
             replace(found, verdict=answer.verdict, reason=answer.reason, components=answer), engine

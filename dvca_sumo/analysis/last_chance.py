@@ -5,8 +5,9 @@ elsewhere by then. The one at fault can prevent it until the last moment at whic
 substitute upstream has gone through all components after it within a latency; so the responsible
 component is the most upstream of those whose last chance is not earlier than that before the latest.
 
-Where even that lies more than `PROMPT` before the violation, it is asked as well whether all four,
-ideal from the start, prevent it: if not, the violation is planning's, and what helped was luck.
+Where even that lies more than `PROMPT` before the violation, it is asked as well whether all four, ideal
+from the start, prevent it: if not, the violation is planning's, and what helped was luck. Of control it is
+asked in any case, from `FURTHER` before: in the last moment a perfect hand saves a plan that was wrong.
 """
 
 from collections.abc import Iterator
@@ -23,6 +24,7 @@ LATENCY = 0.15  # [s] a cycle of the components that run ten times a second, and
 # beginning of either substitution, which runs enter at different moments.
 LATENCY_OF_STATES = 0.6
 PROMPT = 2.5  # [s]
+FURTHER = 8.0  # [s]
 
 
 def decisive(
@@ -52,11 +54,13 @@ def decisive(
         component = rival
 
 
-def is_by_luck(dtest: Dtest, messages: MessageAnswer, time: float) -> bool:
-    """Whether the last chance came long before the violation at `time` [s], and all four ideal are not enough."""
-    if time - messages.last_safe.time <= PROMPT:
+def is_by_luck(dtest: Dtest, record: Record, component: Component, messages: MessageAnswer, time: float) -> bool:
+    """Whether all four, ideal from further back than the last chance of `component`, do not prevent the violation."""
+    is_early = time - messages.last_safe.time > PROMPT
+    if not is_early and component is not Component.CONTROL:
         return False
-    return dtest.ask(Question(SUBSTITUTABLE)) is Outcome.VIOLATES
+    since = None if is_early else mark_before(record, SUBSTITUTABLE[0], time, FURTHER)
+    return dtest.ask(Question(SUBSTITUTABLE, since)) is Outcome.VIOLATES
 
 
 def _later(

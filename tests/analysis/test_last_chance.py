@@ -6,7 +6,7 @@ from analysis.scenes import START, FakeEngine, answering, asking, collision, dri
 from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.analysis.components import ComponentAnswer, responsible_component
 from dvca_sumo.analysis.dtest import Dtest
-from dvca_sumo.analysis.last_chance import LATENCY, PROMPT, decisive, is_by_luck
+from dvca_sumo.analysis.last_chance import FURTHER, LATENCY, PROMPT, decisive, is_by_luck
 from dvca_sumo.analysis.messages import MessageAnswer
 from dvca_sumo.messages import Component
 
@@ -75,7 +75,7 @@ def test_a_single_one_costs_no_further_question_about_others() -> None:
 def test_a_late_chance_is_no_luck_and_is_not_asked_about() -> None:
     _, messages, _, dtest = asked(perception=PROMPT - 0.5)
     count = len(dtest.probes)
-    assert not is_by_luck(dtest, messages, TIME)
+    assert not is_by_luck(dtest, DRIVE, PERCEPTION, messages, TIME)
     assert len(dtest.probes) == count
 
 
@@ -92,8 +92,25 @@ def test_an_early_chance_is_luck_when_all_ideal_from_the_start_fail(*, is_enough
     dtest = asking(FakeEngine(answers))
     answer = responsible_component(dtest, DRIVE, TIME)
     assert answer.all_ideal is Outcome.SAFE
-    _, messages = decisive(dtest, DRIVE, answer, TIME, TIME + 4.0, is_exact=True)
-    assert is_by_luck(dtest, messages, TIME) is not is_enough_from_the_start
+    component, messages = decisive(dtest, DRIVE, answer, TIME, TIME + 4.0, is_exact=True)
+    assert is_by_luck(dtest, DRIVE, component, messages, TIME) is not is_enough_from_the_start
+
+
+@pytest.mark.parametrize("is_enough_further_back", [True, False])
+def test_of_control_it_is_asked_however_late_its_chance_was(*, is_enough_further_back: bool) -> None:
+    enough = answering(DRIVE, {CONTROL: last(CONTROL, 0.4)})
+    nothing = answering(DRIVE, {})
+
+    def answers(task):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+        starts = [one.selection.start for one in task.interventions if hasattr(one, "selection")]
+        is_further = len(starts) == 4 and min(starts) < TIME - START - FURTHER + 0.1
+        return (enough if not is_further or is_enough_further_back else nothing)(task)
+
+    dtest = asking(FakeEngine(answers))
+    answer = responsible_component(dtest, DRIVE, TIME)
+    component, messages = decisive(dtest, DRIVE, answer, TIME, TIME + 4.0, is_exact=True)
+    assert component is CONTROL
+    assert is_by_luck(dtest, DRIVE, component, messages, TIME) is not is_enough_further_back
 
 
 def test_the_latency_is_that_of_components_that_run_ten_times_a_second() -> None:
