@@ -24,7 +24,7 @@ LATENCY = 0.15  # [s] a cycle of the components that run ten times a second, and
 # beginning of either substitution, which runs enter at different moments.
 LATENCY_OF_STATES = 0.6
 PROMPT = 2.5  # [s]
-FURTHER = 8.0  # [s]
+FURTHER = 4.0  # [s]
 
 
 def decisive(
