@@ -83,14 +83,26 @@ class Record(msgspec.Struct):
         tick = math.ceil((time - self.start) / TICK - 1e-6)
         return bisect.bisect_left(self.executions[component], tick, key=lambda execution: execution.tick)
 
-    def believed_at(self, tick: int) -> LocalizationEstimate:
-        """The localization estimate in force at a tick."""
-        executions = self.executions[Component.LOCALIZATION]
-        for row in range(min(tick, len(executions) - 1), -1, -1):
+    def latest(self, component: Component, tick: int) -> Message:
+        """The component's message in force at a tick: the last one published up to and including it.
+
+        Raises:
+            IndexError: There is none yet.
+        """
+        executions = self.executions[component]
+        row = bisect.bisect_right(executions, tick, key=lambda execution: execution.tick) - 1
+        while row >= 0:
             message = executions[row].message
-            if isinstance(message, LocalizationEstimate):
+            if message is not None:
                 return message
-        raise IndexError(f"no localization estimate at or before tick {tick}")
+            row -= 1
+        raise IndexError(f"no message of {component} at or before tick {tick}")
+
+    def believed_at(self, tick: int) -> LocalizationEstimate:
+        """The localization estimate in force at a tick; raises what `latest` does."""
+        believed = self.latest(Component.LOCALIZATION, tick)
+        assert isinstance(believed, LocalizationEstimate)  # localization publishes nothing else
+        return believed
 
     def moment_at(self, tick: int) -> Moment:
         """The truth at a tick: the world step's, moved on to the tick."""

@@ -7,7 +7,7 @@ assumption of monotonicity:
 - in time: what prevents the violation from t on prevents it from any earlier t on too, so the first
   SAFE answer going backwards stands for Definition 10's substitution of the whole component;
 - in components: what one ideal component prevents, all four together prevent at least as late, so
-  single substitutions are not asked later than where all four are enough;
+  single substitutions are not asked later than where all four are enough.
 
 The conclusion itself rests on none: it is confirmed at two adjacent messages, and a certified run asks
 the whole-component question as well.
@@ -57,8 +57,8 @@ def responsible_component(dtest: Dtest, record: Record, time: float) -> Componen
     """Ask the all-ideal question and the four single ones, backwards from the violation at `time` [s], and conclude.
 
     Planning, when the violation stays although everything else is ideal from the start. Otherwise the
-    most upstream component whose substitution alone is enough; the others that are enough are
-    alternatives, since a substitute downstream can hide a fault upstream, never the reverse.
+    most upstream component whose substitution alone is enough, since a substitute downstream can hide a
+    fault upstream; the others that are enough are alternatives, among which `last_chance` decides.
     """
     search = _Backwards(dtest, record, time)
     all_ideal = search.gallop_together()

@@ -44,9 +44,9 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """The same for jitter mode: a fault's window is longer at either end by what phases and noise shift a drive."""
         return msgspec.structs.replace(self, fault=_loosened(self.fault))
 
-    def command(self, seed: int, *, has_jitter: bool) -> str:
-        """What to type to see this case alone."""
-        words = ["dvca-sumo", "run", self.scenario, "--seed", str(seed)]
+    def command(self, seed: int | None, *, has_jitter: bool) -> str:
+        """What to type to see this case alone; `seed` None: the scenario's own."""
+        words = ["dvca-sumo", "run", self.scenario, *([] if seed is None else ["--seed", str(seed)])]
         for option, value in (("--fault", self.fault), ("--bug", self.bug), ("--ego", self.ego)):
             words += [option, value] if value else []
         words += ["--begin", f"{self.begin:g}"] if self.begin is not None else []

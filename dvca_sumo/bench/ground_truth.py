@@ -12,8 +12,8 @@ from typing import Protocol, cast
 
 from dvca_sumo.bench.cases import Case
 from dvca_sumo.engine.replay import roadmap
-from dvca_sumo.messages import Component, LocalizationEstimate, Message, PredictedObjects, TrackedObjects
-from dvca_sumo.record import Digest, Execution, Record
+from dvca_sumo.messages import Component, Message, PredictedObjects, TrackedObjects
+from dvca_sumo.record import Digest, Record
 from dvca_sumo.run import Task
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.stack.bugs import build_with
@@ -83,35 +83,18 @@ def _set(holder: object, path: _Path, value: object) -> None:
 
 def _inputs(component: Component, stack: Stack, record: Record) -> Iterator[tuple[tuple[object, ...], Message | None]]:
     """What each message of `component` was made of, and what it said."""
-    latest = _Latest(record)
     for execution in record.executions[component]:
         tick = execution.tick
-        believed = latest.of(Component.LOCALIZATION, tick)
-        assert isinstance(believed, LocalizationEstimate)
+        believed = record.believed_at(tick)
         if component is Component.PERCEPTION:
             words: tuple[object, ...] = (stack.sensors.detections(record.moment_at(tick), tick // 10), believed)
         else:
             assert component is Component.PLANNING  # as above
-            predicted, tracked = latest.of(Component.PREDICTION, tick), latest.of(Component.PERCEPTION, tick)
+            predicted, tracked = record.latest(Component.PREDICTION, tick), record.latest(Component.PERCEPTION, tick)
             assert isinstance(predicted, PredictedObjects)
             assert isinstance(tracked, TrackedObjects)
             words = (believed, predicted, tracked.signals)
         yield words, execution.message
-
-
-class _Latest:
-    """The message of each component in force at a tick; to be asked with growing ticks."""
-
-    def __init__(self, record: Record) -> None:
-        self._executions: dict[Component, list[Execution]] = record.executions
-        self._rows = dict.fromkeys(record.executions, 0)
-
-    def of(self, component: Component, tick: int) -> Message | None:
-        executions, row = self._executions[component], self._rows[component]
-        while row + 1 < len(executions) and executions[row + 1].tick <= tick:
-            row += 1
-        self._rows[component] = row
-        return executions[row].message
 
 
 def _is_same(one: Message, other: Message | None) -> bool:

@@ -54,7 +54,7 @@ def analysed(cases: Iterable[Case], setting: Setting, jobs: int) -> Iterator[tup
 
     for row, answer in isolated(work(), jobs, TIMEOUT):
         if isinstance(answer, Failure):
-            yield row, failed(begun[row], setting.mode, setting.seed or 0, answer.reason)
+            yield row, failed(begun[row], setting.mode, setting.seed, answer.reason)
         else:
             yield row, answer
 

@@ -47,7 +47,7 @@ class Score(msgspec.Struct, frozen=True):
     name: str
     scenario: str
     mode: Mode
-    seed: int
+    seed: int | None  # of the scenario; None: its own
     expected_component: str
     component: str | None  # None: none was named
     component_success: bool
@@ -99,13 +99,8 @@ def scored(
     is_right = named is component
     is_message_right = is_right and found.message is not None and found.message.index in altered
     counts = record.message_counts
-    return Score(
-        suite=case.suite,
-        name=case.name,
-        scenario=case.scenario,
-        mode=mode,
-        seed=seed,
-        expected_component=component.value,
+    return msgspec.structs.replace(
+        failed(case, mode, seed, found.reason),
         component=None if named is None else named.value,
         component_success=is_right,
         message_success=is_message_right,
@@ -119,15 +114,13 @@ def scored(
         attribution_wall_s=walls[1],
         violation=None if found.violation is None else found.violation.kind,
         verdict=found.verdict.value,
-        reason=found.reason,
         is_proven=is_proven,
         controls=controls,
-        command=case.command(seed, has_jitter=mode == "jitter"),
         baselines=baselines,
     )
 
 
-def failed(case: Case, mode: Mode, seed: int, reason: str) -> Score:
+def failed(case: Case, mode: Mode, seed: int | None, reason: str) -> Score:
     """The score of a case that could not be analysed: no success of any kind."""
     return Score(
         suite=case.suite,

@@ -28,12 +28,12 @@ class _Countdown:
 
     def __init__(self) -> None:
         self._begin = time.perf_counter()
-        self._done = 0
+        self.heard: list[Score] = []
 
     def score(self, score: Score, left: int) -> None:
         """Hear of one more."""
-        self._done += 1
-        remaining = (time.perf_counter() - self._begin) / self._done * left
+        self.heard.append(score)
+        remaining = (time.perf_counter() - self._begin) / len(self.heard) * left
         said = "right" if score.component_success and score.message_success else "WRONG"
         tell(f"{score.name} ({score.mode}): {said}; {left} left, about {remaining:.0f} s")
 
@@ -89,21 +89,34 @@ def bench(
     settings = [Setting(has_controls=wanted is None, baselines=_beside() if baselines else ())]
     settings += [msgspec.structs.replace(settings[0], repeats=repeats or REPEATS)] if jitter else []
     store = None if output is None else Store(output / "scores.jsonl", Score)
-    if wanted is None:
-        cases = [case for name, cases_of in WRITTEN.items() if suite in (None, name, "all") for case in cases_of()]
-        scores = run_benchmark(cases, settings, jobs, store, _Countdown().score)
-    else:
-        places = BUILT_IN if sumocfg is None else places_of(sumocfg, ego, begin)
-        drives = None if output is None else Store(output / "healthy.jsonl", HealthyDrive)
-        drawing = Drawing(1 if seed is None else seed, wanted)
-        scores = [one for setting in settings for one in _random_scores(drawing, places, setting, jobs, store, drives)]
+    countdown = _Countdown()
+    try:
+        if wanted is None:
+            cases = [case for name, cases_of in WRITTEN.items() if suite in (None, name, "all") for case in cases_of()]
+            scores = run_benchmark(cases, settings, jobs, store, countdown.score)
+        else:
+            places = BUILT_IN if sumocfg is None else places_of(sumocfg, ego, begin)
+            drives = None if output is None else Store(output / "healthy.jsonl", HealthyDrive)
+            drawing = Drawing(1 if seed is None else seed, wanted)
+            stores = (store, drives)
+            scores = [
+                one for each in settings for one in _random_scores(drawing, places, each, jobs, stores, countdown)
+            ]
+    except KeyboardInterrupt:
+        if countdown.heard:
+            _publish(countdown.heard, output, as_json=as_json)
+        raise
+    _publish(scores, output, as_json=as_json)
+    is_whole = wanted is None or len(scores) == wanted * len(settings)
+    sys.exit(0 if is_whole and all(check.holds for one in summaries(scores) for check in one.checks) else 1)
+
+
+def _publish(scores: Sequence[Score], output: Path | None, *, as_json: bool) -> None:
     result = json.dumps(json_of(scores), indent=1)
     if output is not None:
         write_whole(output / "benchmark.md", markdown_page(scores))
         write_whole(output / "benchmark.json", result + "\n")
     click.echo(result if as_json else terminal_text(scores))
-    is_whole = wanted is None or len(scores) == wanted * len(settings)
-    sys.exit(0 if is_whole and all(check.holds for one in summaries(scores) for check in one.checks) else 1)
 
 
 def _random_scores(
@@ -111,16 +124,17 @@ def _random_scores(
     places: Sequence[Place],
     setting: Setting,
     jobs: int,
-    store: Store[Score] | None,
-    drives: Store[HealthyDrive] | None,
+    stores: tuple[Store[Score] | None, Store[HealthyDrive] | None],
+    countdown: _Countdown,
 ) -> list[Score]:
+    store, drives = stores
     healthy = healthy_drives(places, setting, jobs, drives)
     for drive in healthy:
         if drive.complaint:
             tell(f"left out, not clean without a fault: {drive.place}: {drive.complaint}")
     clean = [drive for drive in healthy if not drive.complaint]
     tell(f"{len(clean)} clean drive(s) to plant faults in ({setting.mode} mode)")
-    scores, drawn = random_scores(drawing, clean, setting, jobs, store, _Countdown().score)
+    scores, drawn = random_scores(drawing, clean, setting, jobs, store, countdown.score)
     tell(f"{len(scores)} of {drawn} drawn faults violate")
     if len(scores) < drawing.wanted:
         tell(f"drawing stopped: none of the last {PATIENCE} violates; {drawing.wanted} were asked for")

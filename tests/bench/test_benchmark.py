@@ -1,5 +1,7 @@
 """Interrupted and broken benchmarks: what is known stays known, what failed is tried again."""
 
+import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,7 @@ from dvca_sumo.bench.benchmark import run_benchmark
 from dvca_sumo.bench.cases import Case
 from dvca_sumo.bench.runs import Setting, analysed
 from dvca_sumo.bench.score import FAILED, Score
+from dvca_sumo.cli import ExitCode, benching, main
 from dvca_sumo.messages import Component
 from dvca_sumo.store import Store
 
@@ -74,3 +77,26 @@ def test_a_case_that_cannot_be_run_is_no_success_and_says_why() -> None:
     assert found.verdict == FAILED
     assert not found.component_success
     assert "none.sumocfg" in found.reason
+    assert found.command == "dvca-sumo run nets/none.sumocfg --fault control.lateral"
+
+
+@pytest.mark.parametrize("form", ["text", "json"])
+def test_interrupted_it_tells_what_it_has_found(
+    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def dying(cases, settings, jobs, store, on_score):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202, ARG001
+        on_score(score("perception.miss/cs1"), 38)
+        raise KeyboardInterrupt
+
+    words = ["dvca-sumo", "bench", "-o", str(tmp_path), *(["--json"] if form == "json" else [])]
+    monkeypatch.setattr(sys, "argv", words)
+    monkeypatch.setattr(benching, "run_benchmark", dying)
+    with pytest.raises(SystemExit) as left:
+        main()
+    said = capfd.readouterr()
+    assert left.value.code == ExitCode.INTERRUPTED
+    if form == "json":
+        assert [case["name"] for case in json.loads(said.out)["cases"]] == ["perception.miss/cs1"]
+    else:
+        assert "Injected faults, exact mode: 1 cases" in said.out
+    assert (tmp_path / "benchmark.md").exists()
