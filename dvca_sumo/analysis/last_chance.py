@@ -5,6 +5,11 @@ elsewhere by then. The one at fault can prevent it until the last moment at whic
 substitute upstream has gone through all components after it within a latency; so the responsible
 component is the most upstream of those whose last chance is not earlier than that before the latest.
 
+Ideal prediction knows what nobody can foresee, and ideal control moves as no vehicle does: both may find
+a way out when others could no more. They are held responsible in place of localization or perception
+only where, as they were, they let a violation happen in spite of true inputs from the last chance of
+those, or from further back.
+
 Where even that lies more than `PROMPT` before the violation, it is asked as well whether all four, ideal
 from the start, prevent it: if not, the violation is planning's, and what helped was luck. Of control it is
 asked in any case, from `FURTHER` before: in the last moment a perfect hand saves a plan that was wrong.
@@ -25,6 +30,9 @@ LATENCY = 0.15  # [s] a cycle of the components that run ten times a second, and
 LATENCY_OF_STATES = 0.6
 PROMPT = 2.5  # [s]
 FURTHER = 4.0  # [s]
+
+_SENSING = (Component.LOCALIZATION, Component.PERCEPTION)
+_BACK = (0.0, 1.0, 2.0, 4.0)  # [s] further back: that once all goes well may be luck, not that it does so each time
 
 
 def decisive(
@@ -77,8 +85,17 @@ def _later(
         if is_open and _is_enough(dtest, record, other, chance - latency, time):
             yield other
     for other in SUBSTITUTABLE[place + 1 :]:
-        if answer.singles[other] is Outcome.SAFE and _is_enough(dtest, record, other, chance + latency, time):
-            yield other
+        if answer.singles[other] is not Outcome.SAFE or not _is_enough(dtest, record, other, chance + latency, time):
+            continue
+        if other not in _SENSING and component in _SENSING and _do_their_best(dtest, record, chance):
+            continue
+        yield other
+
+
+def _do_their_best(dtest: Dtest, record: Record, chance: float) -> bool:
+    """Whether the others as they were prevent the violation, given the truth from `chance` [s] on or from before."""
+    marks = [mark_before(record, _SENSING[0], chance, back) for back in _BACK]
+    return all(dtest.ask(Question(_SENSING, mark)) is Outcome.SAFE for mark in marks)
 
 
 def _is_enough(dtest: Dtest, record: Record, component: Component, since: float, time: float) -> bool:

@@ -4,6 +4,7 @@ Rules of this file: no thread is ever started; a child leaves only through its p
 child outlives its parent.
 """
 
+import contextlib
 import ctypes
 import itertools
 import multiprocessing
@@ -88,7 +89,8 @@ def isolated(
         try:
             while True:
                 for index, job in itertools.islice(waiting, parallel - len(running)):
-                    running.append(_Child(index, job, Path(folder) / str(index), timeout))
+                    with _no_interrupts():
+                        running.append(_Child(index, job, Path(folder) / str(index), timeout))
                 if not running:
                     return
                 remaining = min(child.deadline for child in running) - time.monotonic()
@@ -105,8 +107,23 @@ def isolated(
                 child.kill()
 
 
+@contextlib.contextmanager
+def _no_interrupts() -> Iterator[None]:
+    """Hold an interrupt back: a child that was just forked does not ignore it yet (POSIX only)."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _work(job: Callable[[], object], sender: Connection, log: Path, parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt ends
+    if sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # see `_no_interrupts`: a held one is dropped
     die_with(parent)
     tempfile.tempdir = str(log.parent)  # so that nothing outlives a killed child
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)

@@ -2,13 +2,16 @@
 
 import pytest
 
-from analysis.scenes import START, FakeEngine, answering, asking, collision, drive
+from analysis.scenes import START, FakeEngine, answering, asking, collision, drive, ideals
 from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.analysis.components import ComponentAnswer, responsible_component
 from dvca_sumo.analysis.dtest import Dtest
 from dvca_sumo.analysis.last_chance import FURTHER, LATENCY, PROMPT, decisive, is_by_luck
 from dvca_sumo.analysis.messages import MessageAnswer
+from dvca_sumo.engine.processes import Failure
+from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.messages import Component
+from dvca_sumo.run import Task
 
 LOCALIZATION, PERCEPTION, PREDICTION, CONTROL = (
     Component.LOCALIZATION,
@@ -50,8 +53,28 @@ def test_one_that_could_prevent_it_only_earlier_did_so_by_luck() -> None:
     assert messages.last_safe.index == last(PERCEPTION, 0.4)
 
 
-def test_one_downstream_that_could_prevent_it_later_is_responsible() -> None:
-    assert asked(perception=0.9, control=0.3)[0] is CONTROL
+@pytest.mark.parametrize("downstream", [PREDICTION, CONTROL])
+@pytest.mark.parametrize(("goes_wrong", "responsible"), [((0.0,), None), ((4.0,), None), ((), PERCEPTION)])
+def test_foresight_and_a_perfect_hand_alone_make_nobody_responsible(
+    downstream: Component, goes_wrong: tuple[float, ...], responsible: Component | None
+) -> None:
+    """Only who, given the truth from the last chance or some time before, still fails."""
+    befores = {PERCEPTION: 0.9, downstream: 0.3}
+    enough = answering(DRIVE, {component: last(component, before) for component, before in befores.items()})
+    nothing = answering(DRIVE, {})
+
+    def answers(task: Task) -> Glimpse | Failure:
+        asked_of = ideals(task)
+        is_sensing = set(asked_of) == {LOCALIZATION, PERCEPTION}
+        back = TIME - START - 0.9 - max(ideal.selection.start for ideal in asked_of.values())
+        fails = is_sensing and any(abs(back - one) < CYCLE for one in goes_wrong)
+        return (nothing if fails else enough)(task)
+
+    dtest = asking(FakeEngine(answers))
+    answer = responsible_component(dtest, DRIVE, TIME)
+    component, messages = decisive(dtest, DRIVE, answer, TIME, TIME + 4.0, is_exact=True)
+    assert component is (responsible or downstream)
+    assert messages.last_safe.index == last(component, befores[component])
 
 
 def test_one_upstream_that_was_just_out_of_reach_of_the_common_question_is_found() -> None:

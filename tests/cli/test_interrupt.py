@@ -1,9 +1,11 @@
-"""Ctrl-C while probes run: what was found is kept, and nobody is left behind."""
+"""Ctrl-C half-way: what was found is kept, and nobody is left behind."""
 
+import json
 import os
 import select
 import signal
 import subprocess
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -12,16 +14,15 @@ from command_line import COMMAND, environment, loaded
 from dvca_sumo.cli import ExitCode
 
 
-@pytest.mark.skipif(os.name != "posix", reason="process groups")
-def test_an_interrupted_analysis_prints_and_keeps_what_it_has_found(tmp_path: Path) -> None:
-    words = ("run", "nets/cs1.sumocfg", "--fault", "perception.miss", "--json", "-o", str(tmp_path / "out"))
+def interrupted(words: Sequence[str], folder: Path, is_time: Callable[[str], bool]) -> tuple[int, str, str]:
+    """Exit code and output of a command that is interrupted once it has said such a line; nobody may be left behind."""
     alive, inherited = os.pipe()  # readable as soon as no process holds its other end any more
     running = subprocess.Popen(  # noqa: S603 our own command
         [*COMMAND, *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        cwd=tmp_path,
+        cwd=folder,
         env=environment(),
         pass_fds=(inherited,),
         start_new_session=True,
@@ -29,13 +30,21 @@ def test_an_interrupted_analysis_prints_and_keeps_what_it_has_found(tmp_path: Pa
     os.close(inherited)
     with running:
         assert running.stderr is not None
-        while not (line := running.stderr.readline()).startswith("probe "):
-            assert line, "it ended before any probe did"
+        while not is_time(line := running.stderr.readline()):
+            assert line, "it ended before that"
         os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to parent and children alike
         out, err = running.communicate(timeout=60)
     left_behind = not select.select([alive], [], [], 20.0)[0]
     os.close(alive)
-    assert running.returncode == ExitCode.INTERRUPTED
+    assert not left_behind
+    return running.returncode, out, err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="process groups")
+def test_an_interrupted_analysis_prints_and_keeps_what_it_has_found(tmp_path: Path) -> None:
+    words = ("run", "nets/cs1.sumocfg", "--fault", "perception.miss", "--json", "-o", str(tmp_path / "out"))
+    code, out, err = interrupted(words, tmp_path, lambda line: line.startswith("probe "))
+    assert code == ExitCode.INTERRUPTED
     assert "Traceback" not in err
     assert err.splitlines()[-1] == "interrupted"
     partial = loaded(out)
@@ -44,4 +53,16 @@ def test_an_interrupted_analysis_prints_and_keeps_what_it_has_found(tmp_path: Pa
     assert partial["reason"] == "interrupted"
     assert partial["violations"]
     assert partial["message"] is None
-    assert not left_behind
+
+
+@pytest.mark.skipif(os.name != "posix", reason="process groups")
+def test_an_interrupted_benchmark_prints_and_keeps_the_cases_it_has(tmp_path: Path) -> None:
+    words = ("bench", "--suite", "real-bugs", "--jobs", "1", "--json", "-o", str(tmp_path / "out"))
+    code, out, err = interrupted(words, tmp_path, lambda line: " left, about " in line)
+    assert code == ExitCode.INTERRUPTED
+    assert "Traceback" not in err
+    assert err.splitlines()[-1] == "interrupted"
+    partial = json.loads(out)
+    assert [case["suite"] for case in partial["cases"]] == ["real-bugs"]
+    assert json.loads((tmp_path / "out" / "benchmark.json").read_text(encoding="utf-8")) == partial
+    assert len((tmp_path / "out" / "scores.jsonl").read_text(encoding="utf-8").splitlines()) == 1

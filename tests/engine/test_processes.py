@@ -246,3 +246,20 @@ def test_a_killed_parent_leaves_no_child(tmp_path: Path) -> None:
     assert ready
     assert os.read(reader, 1) == b""  # nobody holds the other end any more
     os.close(reader)
+
+
+@pytest.mark.usefixtures("_interruptible")
+def test_an_interrupt_while_a_child_starts_is_the_parents_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A terminal interrupts the child, too, before it ignores that."""
+    fork = os.fork
+
+    def interrupted_fork() -> int:
+        child = fork()
+        os.kill(os.getpid(), signal.SIGINT)
+        return child
+
+    monkeypatch.setattr(os, "fork", interrupted_fork)
+    with pytest.raises(KeyboardInterrupt):
+        answers([lambda: "here"])
+    monkeypatch.undo()
+    assert answers([lambda: "still here"]) == ["still here"]
