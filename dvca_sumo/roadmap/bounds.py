@@ -1,4 +1,4 @@
-"""How much room there is to either side of a route's line."""
+"""How much room there is to either side of a route's line, and where lanes run beside it."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,8 +8,10 @@ import numpy as np
 from dvca_sumo.geometry.polyline import Floats, Polyline
 from dvca_sumo.roadmap.drawing import Change
 from dvca_sumo.roadmap.lanes import Lane
+from dvca_sumo.roadmap.route import LaneChange
 
 _JUNCTION_MARGIN = 0.5  # [m] of drivable surface beside a lane on a junction
+_EVENED = 5  # [m] to either side over which offsets of lanes are averaged
 
 
 class Bounds(msgspec.Struct, frozen=True, eq=False):
@@ -35,6 +37,30 @@ def bounds(
     for array in (found.lane_left, found.lane_right, found.road_left, found.road_right):
         array.setflags(write=False)
     return found
+
+
+def lane_change(line: Polyline, change: Change) -> LaneChange:
+    """Where the lanes of `change`, whose stations are on `line`, run beside it."""
+    first, last = np.searchsorted(line.stations, (change.begin, change.latest))
+    rows = slice(int(first), max(int(last), int(first)) + 1)
+    offsets = np.stack([_evened(_centre(line, lane, rows)) for lane in change.lanes])
+    offsets.setflags(write=False)
+    return LaneChange(
+        lanes=tuple(lane.id for lane in change.lanes),
+        widths=tuple(lane.width for lane in change.lanes),
+        start_station=change.begin,
+        latest_station=change.latest,
+        stations=line.stations[rows],
+        offsets=offsets,
+    )
+
+
+def _evened(offsets: Floats) -> Floats:
+    """Without the kinks of the net's shapes, at points 1 m apart; both ends stay where they are."""
+    reach = min(_EVENED, len(offsets) - 1)
+    kernel = np.hanning(2 * reach + 3)[1:-1]
+    padded = np.concatenate((np.full(reach, offsets[0]), offsets, np.full(reach, offsets[-1])))
+    return np.convolve(padded, kernel / kernel.sum(), mode="valid")
 
 
 def _put(found: Bounds, lanes: Mapping[str, Lane], line: Polyline, lane: Lane, rows: slice, *, is_first: bool) -> None:

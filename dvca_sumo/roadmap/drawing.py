@@ -25,6 +25,7 @@ class Change(msgspec.Struct, frozen=True, eq=False):
     lanes: tuple[Lane, ...]
     begin: float  # [m] station
     end: float  # [m]
+    latest: float  # [m] where the lanes end
 
 
 class Drawing:
@@ -73,8 +74,9 @@ class Drawing:
             self._append(points[:row] if index == 1 else points[int(np.searchsorted(nearest, index - 1)) : row])
             self.stretches.append(Stretch(lanes[index], self.length))
         self._append(points[int(np.searchsorted(nearest, len(lanes) - 1)) :])
-        self.changes.append(Change(tuple(lanes), origin, self.length))
+        end = self.length
         self._append(_cut(last.line, float(reached[-1]), last.line.length))
+        self.changes.append(Change(tuple(lanes), origin, end, self.length))
         return begin, self.length
 
     def _join(self, lane: Lane) -> float:

@@ -3,6 +3,7 @@
 import enum
 
 import msgspec
+import numpy as np
 
 from dvca_sumo.geometry.polyline import Floats, Polyline
 
@@ -52,6 +53,25 @@ class Crossing(msgspec.Struct, frozen=True, eq=False):
     end_station: float  # [m]
 
 
+class LaneChange(msgspec.Struct, frozen=True, eq=False):
+    """Where the route crosses from lane to lane: drawn as early as there is room, to be done anywhere on the way."""
+
+    lanes: tuple[str, ...]  # in the order of crossing, at least two
+    widths: tuple[float, ...]  # [m] of them
+    start_station: float  # [m] from where the line crosses over
+    latest_station: float  # [m] where it must be over: the edge ends, or the route
+    stations: Floats  # (n,) [m] from start to latest
+    offsets: Floats  # (lanes, n) [m] of their centres from the line, there
+
+    def centres(self, stations: Floats) -> Floats:
+        """(lanes, m) offsets of the lanes' centres at `stations` (m,) [m]; held before and after."""
+        return np.stack([np.interp(stations, self.stations, offsets) for offsets in self.offsets])
+
+    def nearest(self, station: float, offset: float) -> int:
+        """The lane, by its place in `lanes`, whose centre is nearest to a point beside the line [m]."""
+        return int(np.abs(self.centres(np.array([station]))[:, 0] - offset).argmin())
+
+
 class UnmappedLimit(msgspec.Struct, frozen=True, eq=False):
     """A stretch whose speed limit the map that the ego drives on does not have."""
 
@@ -80,3 +100,8 @@ class Route(msgspec.Struct, frozen=True, eq=False):
     stop_lines: tuple[StopLine, ...]  # by station
     crossings: tuple[Crossing, ...]  # by station
     unmapped_limits: tuple[UnmappedLimit, ...] = ()  # by station
+    lane_changes: tuple[LaneChange, ...] = ()  # by station
+
+    def lane_change_at(self, station: float) -> LaneChange | None:
+        """The change of lanes that is to be done at `station` [m], if there is one."""
+        return next((one for one in self.lane_changes if one.start_station <= station <= one.latest_station), None)

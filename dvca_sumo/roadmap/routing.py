@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.polyline import Floats, Polyline
-from dvca_sumo.roadmap.bounds import bounds
+from dvca_sumo.roadmap.bounds import bounds, lane_change
 from dvca_sumo.roadmap.drawing import Change, Drawing, Stretch
 from dvca_sumo.roadmap.lane_sequence import Leg, change_length, lane_sequence
 from dvca_sumo.roadmap.lanes import Lane, Movement
@@ -54,7 +54,11 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
 
     owners = np.searchsorted([stretch.begin for stretch in plan.stretches], along, side="right") - 1
     followed = [plan.stretches[owner].lane for owner in np.maximum(owners, 0)]
-    changes = [Change(change.lanes, moved(change.begin), moved(change.end)) for change in plan.changes]
+    destination = moved(plan.destination)
+    changes = [
+        Change(change.lanes, moved(change.begin), moved(change.end), min(moved(change.latest), destination))
+        for change in plan.changes
+    ]
     runs = list(_runs(followed))
     edges_of = bounds(net.lanes, line, runs, changes)
     passages = [
@@ -72,7 +76,7 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
         road_left=edges_of.road_left,
         road_right=edges_of.road_right,
         start=moved(plan.start),
-        destination=moved(plan.destination),
+        destination=destination,
         stop_lines=tuple(stop_line(net, p.movement, p.begin, p.end) for p in passages),
         crossings=tuple(crossing for p in passages for crossing in crossings(net, p.movement, line, p.begin, p.end)),
         unmapped_limits=tuple(
@@ -80,6 +84,7 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
             for lane, rows in runs
             if not lane.is_limit_mapped
         ),
+        lane_changes=tuple(lane_change(line, change) for change in changes if change.latest > change.begin),
     )
 
 

@@ -50,7 +50,13 @@ class Ego:
         """The route's lane under its front bumper, for SUMO's map matching."""
         line = self.route.line
         front = min(self.station() + self.shape.front, line.length)
-        return self.route.lane_ids[int(line.stations.searchsorted(front, side="right")) - 1]
+        change = self.route.lane_change_at(front)
+        if change is None:
+            return self.route.lane_ids[int(line.stations.searchsorted(front, side="right")) - 1]
+        truth, reach = self.vehicle.truth, self.shape.front
+        nose = (truth.x + reach * math.cos(truth.heading), truth.y + reach * math.sin(truth.heading))
+        _, offsets = line.project([nose], between=(front - reach, front + reach))
+        return change.lanes[change.nearest(front, float(offsets[0]))]
 
 
 class Native:

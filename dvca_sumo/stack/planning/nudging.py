@@ -66,6 +66,7 @@ class NudgeDecider:
         self._config = config
         self._half = 0.5 * shape.width
         self._since: dict[int, float] = {}  # by track: when it came to stand
+        self._driven: set[int] = set()  # tracks that were seen driving
         self._held: dict[int, Plateau] = {}  # by track: the last cycle's, in route stations
 
     @property
@@ -77,6 +78,8 @@ class NudgeDecider:
         """The nudges of this cycle by station; objects without one are passed by staying in lane, or stopped for."""
         scene, station = situation.scene, situation.window.station
         standing = [scene.ids[row] for row in scene.is_standing.nonzero()[0].tolist()]
+        self._driven &= set(scene.ids)
+        self._driven.update(scene.ids[row] for row in (~scene.is_standing).nonzero()[0].tolist())
         self._since = {track: self._since.get(track, situation.time) for track in standing}
         nudges = []
         for blocker in self._blockers(scene, situation.window) if standing else ():
@@ -173,11 +176,17 @@ class NudgeDecider:
             return True
         if situation.scene.classes[blocker.row] != _STATIC:
             stood = situation.time - self._since[blocker.track]
-            if stood < self._config.parked_after or self._is_queueing(blocker, situation):
+            patience = self._config.broken_down_after if self._is_in_traffic(blocker, situation) else 0.0
+            if stood < max(self._config.parked_after, patience) or self._is_queueing(blocker, situation):
                 return False
         length = blend_length(offset, situation.speed, self._config)
         band = (blocker.low - self._shape.front - length, blocker.high + length)
         return self._is_free(offset, band, situation.speed, situation.scene)
+
+    def _is_in_traffic(self, blocker: _Blocker, situation: Situation) -> bool:
+        """Who was seen driving and now stands in the middle of our lane has a reason that may be out of sight."""
+        offset = abs(float(situation.scene.now.offsets[blocker.row]))
+        return blocker.track in self._driven and offset < _IN_LANE
 
     def _is_queueing(self, blocker: _Blocker, situation: Situation) -> bool:
         """A vehicle in our lane may just wait, however long it has stood: near a line, or behind one that waits."""

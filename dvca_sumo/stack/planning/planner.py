@@ -18,11 +18,12 @@ from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.destination import stop_station
 from dvca_sumo.stack.planning.junctions import Junctions, LineView
+from dvca_sumo.stack.planning.lane_changing import LaneChanger, LaneChoice
 from dvca_sumo.stack.planning.limits import nearest_stop, speed_caps
 from dvca_sumo.stack.planning.meeting import Demand, Meetings
 from dvca_sumo.stack.planning.nudging import Nudge, NudgeDecider, Situation
 from dvca_sumo.stack.planning.path import Path, lateral_start, path_along
-from dvca_sumo.stack.planning.reference import Reference, Window
+from dvca_sumo.stack.planning.reference import BEHIND, Reference, Window
 from dvca_sumo.stack.planning.scene import Scene, scene_in
 from dvca_sumo.stack.planning.speed import Profile, Stop, roll_out
 from dvca_sumo.stack.planning.st_graph import Graph, graph_of, leader_of, leading
@@ -45,6 +46,7 @@ class Planner:
         self._reference = Reference(route, shape, config)
         self._destination = stop_station(route, config)
         self._junctions = Junctions(route, config)
+        self._lane_changer = LaneChanger(route, shape, config)
         self._nudging = NudgeDecider(shape, config)
         self._meetings = Meetings(shape, config)
         self._previous: Trajectory | None = None
@@ -93,6 +95,10 @@ class Planner:
         station, offset = located
         config, shape = self._config, self._shape
         window = self._reference.window(station, self._reach(station, start.speed))
+        choice = self._lane_changer.step(window, offset, start.speed, predicted.objects)
+        if choice.keeping is not None:
+            window = window.moved(choice.keeping.offsets, choice.keeping.width)
+            offset -= float(choice.keeping.offsets[BEHIND])
         scene = scene_in(window, predicted, time, self._nudging.stood, config)
         nose = station if config.lines_at_rear_axle else station + shape.front
         views = self._junctions.step(time, nose, station - shape.rear_overhang, start.speed, signals, predicted.objects)
@@ -100,7 +106,7 @@ class Planner:
         nudges = self._nudging.step(Situation(time, start.speed, lateral, window, scene, views))
         path = path_along(window, start, lateral, [nudge.plateau for nudge in nudges], shape, config)
         graph = graph_of(scene, window, path, self._route.crossings, shape, config)
-        profile = self._profile(start, window, path, scene, graph, views)
+        profile = self._profile(start, window, path, scene, graph, views, choice)
         return _points(path, profile), profile.label or _described(nudges, path)
 
     def _reach(self, station: float, speed: float) -> float:
@@ -110,7 +116,14 @@ class Planner:
         return _HORIZON * max(speed, min(speed + gained, fastest)) + self._shape.front + _SPARE
 
     def _profile(
-        self, start: StartState, window: Window, path: Path, scene: Scene, graph: Graph, views: list[LineView]
+        self,
+        start: StartState,
+        window: Window,
+        path: Path,
+        scene: Scene,
+        graph: Graph,
+        views: list[LineView],
+        choice: LaneChoice,
     ) -> Profile:
         """The fastest motion that all demands allow, found by adding demands until nobody else is in the way."""
         config, shape = self._config, self._shape
@@ -118,10 +131,15 @@ class Planner:
         if abs(math.remainder(start.heading - float(path.headings[0]), 2.0 * math.pi)) > _ASTRAY:
             caps = [min(cap, config.astray_speed) for cap in caps]
         leaders, others = leading(graph, scene, shape, config)
+        if choice.behind:
+            others = [row for row in others if scene.ids[scene.owners[row]] not in choice.behind]
         leader = leader_of(leaders, graph, scene, shape)
         to_destination = self._destination - window.station - shape.front
         blocker = blocking(scene, window, path, shape, config)
         stops = [nearest_stop(to_destination, blocker, scene, graph, views, leader, shape, config)]
+        if choice.keeping is not None:
+            stops.append(choice.keeping.stop)
+            caps = [min(cap, choice.keeping.pace) for cap in caps]
         profile = roll_out(start.speed, start.acceleration, caps, stops, leader, config)
         demands: dict[int, Demand] = {}
         for _ in range(_ROUNDS):

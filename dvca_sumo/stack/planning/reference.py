@@ -52,6 +52,25 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         np.minimum(rows, self.rows.shape[1] - 1, out=rows)
         return rows
 
+    def moved(self, offsets: Floats, width: float) -> "Window":
+        """The window of a line beside this one, at `offsets` (n,) [m], along a lane so wide [m].
+
+        Its stations are those of this line.
+        """
+        slopes = np.gradient(offsets)
+        scale = 1.0 - self.curvatures * offsets
+        headings = self.headings + np.arctan2(slopes, scale)
+        rows = np.empty_like(self.rows)
+        rows[_X] = self.x - offsets * self.sines
+        rows[_Y] = self.y + offsets * self.cosines
+        rows[_COS], rows[_SIN], rows[_HEADING] = np.cos(headings), np.sin(headings), headings
+        rows[_CURVATURE] = np.gradient(headings) / np.hypot(slopes, scale)
+        rows[_LIMIT] = self.speed_limits
+        rows[_LANE_LEFT] = np.maximum(self.lane_left - offsets, 0.5 * width)
+        rows[_LANE_RIGHT] = np.minimum(self.lane_right - offsets, -0.5 * width)
+        rows[_ROAD_LEFT], rows[_ROAD_RIGHT] = self.road_left - offsets, self.road_right - offsets
+        return Window(self.station, rows, *rows)
+
     def project(self, points: Floats) -> tuple[Floats, Floats, Floats]:
         """Stations, offsets and the line's heading there, of points (m, 2).
 

@@ -1,0 +1,115 @@
+"""Changes of lane that the route needs: into a gap, or not at all."""
+
+import msgspec
+import numpy as np
+import pytest
+from planned_drives import SHAPE, Drive, assert_drivable, car, drive, road
+
+from dvca_sumo.messages import Floats
+from dvca_sumo.roadmap import Route
+from dvca_sumo.roadmap.route import LaneChange
+
+WIDTH = 3.2  # [m] of a lane
+START, LATEST = 100.0, 400.0  # [m]
+
+
+def crossing_over(lanes: int = 1) -> Route:
+    """Along x; from 100 m on the line moves over so many lanes to the left, and the ego's own lane ends at 400 m."""
+    stations = np.arange(0.0, 600.5)
+    share = np.clip((stations - START) / (50.0 * lanes), 0.0, 1.0)
+    line = lanes * WIDTH * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    found = road(np.column_stack((stations, line)), destination=590.0)
+    along = found.line.stations
+    over = np.interp(along, np.hypot(np.diff(stations, prepend=0.0), np.diff(line, prepend=0.0)).cumsum(), line)
+    rows = (along >= START) & (along <= LATEST)
+    change = LaneChange(
+        lanes=tuple(f"ego_{lane}" for lane in range(lanes + 1)),
+        widths=(WIDTH,) * (lanes + 1),
+        start_station=START,
+        latest_station=LATEST,
+        stations=along[rows],
+        offsets=np.stack([lane * WIDTH - over[rows] for lane in range(lanes + 1)]),
+    )
+    edges = {
+        "lane_left": np.where(along > START + 50.0 * lanes, 0.5 * WIDTH, (lanes + 0.5) * WIDTH - over),
+        "lane_right": np.where(along > START + 50.0 * lanes, -0.5 * WIDTH, -0.5 * WIDTH - over),
+        "road_left": (lanes + 0.5) * WIDTH - over,
+        "road_right": -0.5 * WIDTH - over,
+    }
+    return msgspec.structs.replace(found, lane_changes=(change,), **edges)
+
+
+def lane_at(driven: Drive, x: float) -> float:
+    """Where the ego is sideways at x, in lanes."""
+    return float(np.interp(x, driven.states[:, 1], driven.states[:, 2])) / WIDTH
+
+
+def fronts_on(driven: Drive, lane: int) -> Floats:
+    """Where the front bumper is while the ego's middle is on that lane [m]."""
+    fronts: Floats = driven.fronts[np.rint(driven.states[:, 2] / WIDTH) == lane]
+    return fronts
+
+
+def test_into_a_free_lane_it_goes_along_the_line_as_if_there_were_but_one() -> None:
+    driven = drive(crossing_over(), 30.0, speed=13.0)
+    alone = drive(msgspec.structs.replace(crossing_over(), lane_changes=()), 30.0, speed=13.0)
+    assert np.array_equal(driven.states, alone.states)
+
+
+@pytest.mark.parametrize("ahead", [-8.0, -3.0, 0.0, 3.0, 8.0])
+def test_beside_one_as_fast_it_falls_back_and_changes_behind(ahead: float) -> None:
+    driven = drive(crossing_over(), 40.0, speed=13.0, actors=[car(7, 7.0 + ahead, WIDTH, speed=13.0)])
+    assert driven.clearances.min() > 1.0
+    assert driven.speeds.min() > 8.0
+    assert lane_at(driven, LATEST) == pytest.approx(1.0, abs=0.1)
+    assert_drivable(driven)
+
+
+def test_one_that_comes_up_fast_from_behind_goes_first() -> None:
+    driven = drive(crossing_over(), 40.0, speed=10.0, actors=[car(7, -60.0, WIDTH, speed=20.0)])
+    is_ahead = driven.states[:, 1] > -60.0 + 20.0 * driven.states[:, 0]
+    assert np.abs(driven.states[is_ahead, 2]).max() < 0.3
+    assert lane_at(driven, LATEST) == pytest.approx(1.0, abs=0.1)
+
+
+def test_beside_a_queue_without_a_gap_it_waits_at_the_end_of_its_lane() -> None:
+    queue = [car(number, 60.0 + 6.5 * number, WIDTH) for number in range(60)]
+    driven = drive(crossing_over(), 70.0, speed=13.0, actors=queue)
+    assert driven.speeds[-1] == 0.0
+    assert 0.0 < LATEST - driven.fronts[-1] < 30.0
+    assert abs(driven.states[-1, 2]) < 0.2
+    assert driven.decisions[-1] == "wait to change lanes"
+    assert_drivable(driven)
+
+
+def test_behind_the_tail_of_a_queue_it_changes_and_stops() -> None:
+    queue = [car(number, 200.0 + 6.5 * number, WIDTH, speed=10.0, stays_from=5.0) for number in range(40)]
+    driven = drive(crossing_over(), 60.0, speed=13.0, actors=queue)
+    assert driven.speeds[-1] == 0.0
+    assert driven.states[-1, 2] == pytest.approx(WIDTH, abs=0.2)
+    assert driven.clearances.min() > 1.0
+
+
+def test_when_the_queue_drives_off_it_changes_from_standstill() -> None:
+    queue = [car(number, 60.0 + 6.5 * number, WIDTH, speed=8.0, leaves=60.0) for number in range(55)]
+    driven = drive(crossing_over(), 130.0, speed=13.0, actors=queue)
+    assert driven.clearances.min() > 0.8
+    assert lane_at(driven, LATEST) == pytest.approx(1.0, abs=0.1)
+    assert_drivable(driven)
+
+
+def test_over_two_lanes_it_waits_on_the_middle_one() -> None:
+    driven = drive(crossing_over(2), 45.0, speed=13.0, actors=[car(7, 7.0, 2.0 * WIDTH, speed=12.0)])
+    assert len(fronts_on(driven, 1)) > 20
+    assert driven.clearances.min() > 1.0
+    assert lane_at(driven, LATEST) == pytest.approx(2.0, abs=0.1)
+    assert_drivable(driven)
+
+
+def test_one_that_pulls_into_the_gap_in_time_is_let_in() -> None:
+    """A gap that closes while the ego is still in its lane is given up."""
+    start = START - SHAPE.front
+    merging = car(7, start - 20.0, WIDTH, speed=16.0)
+    driven = drive(crossing_over(), 40.0, speed=13.0, station=start - 20.0, actors=[merging])
+    assert driven.clearances.min() > 1.0
+    assert lane_at(driven, LATEST) == pytest.approx(1.0, abs=0.1)
