@@ -56,13 +56,17 @@ class ComponentAnswer(msgspec.Struct, frozen=True):
 def responsible_component(dtest: Dtest, record: Record, time: float) -> ComponentAnswer:
     """Ask the all-ideal question and the four single ones, backwards from the violation at `time` [s], and conclude.
 
-    Planning, when the violation stays although everything else is ideal from the start. Otherwise the
-    most upstream component whose substitution alone is enough, since a substitute downstream can hide a
-    fault upstream; the others that are enough are alternatives, among which `last_chance` decides.
+    Planning, when the violation stays although everything else is ideal from the start. That is asked even
+    where all four are enough later on but no single one ever is: a perfect hand may save in the last
+    second what was planned wrong. Otherwise the most upstream component whose substitution alone is
+    enough, since a substitute downstream can hide a fault upstream; the others that are enough are
+    alternatives, among which `last_chance` decides.
     """
     search = _Backwards(dtest, record, time)
     all_ideal = search.gallop_together()
     singles = search.gallop_singly() if all_ideal is Outcome.SAFE else search.vector()
+    if all_ideal is Outcome.SAFE and Outcome.SAFE not in singles.values():
+        all_ideal = search.together_from_the_start()
     return concluded(all_ideal, singles, search.since)
 
 
@@ -103,6 +107,11 @@ class _Backwards:
             self._enough = level
             if outcome is Outcome.SAFE:
                 break
+        return outcome
+
+    def together_from_the_start(self) -> Outcome:
+        """All four ideal for the whole drive."""
+        (outcome,) = self._ask([SUBSTITUTABLE], len(self._levels) - 1)
         return outcome
 
     def gallop_singly(self) -> dict[Component, Outcome]:

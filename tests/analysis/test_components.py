@@ -179,6 +179,17 @@ def test_planning_is_named_only_when_all_ideal_from_the_start_changes_nothing() 
     assert set(found.singles) == set(SUBSTITUTABLE)
 
 
+def test_what_only_a_perfect_hand_in_the_last_second_prevents_is_plannings() -> None:
+    def answers(task: Task) -> Glimpse:
+        substituted = ideals(task)
+        since = max(ideal.selection.start for ideal in substituted.values())
+        return SAFE if len(substituted) > 1 and VIOLATED - START - since < 3.0 else VIOLATING
+
+    found, _ = asked_of(answers)
+    assert found.verdict is Verdict.PLANNING
+    assert found.all_ideal is V
+
+
 def test_a_component_costs_a_few_questions_for_each_doubling_of_time() -> None:
     for back in (0.5, 1.5, 3.0, 6.0, 12.0, 24.0, 38.0):
         for component in SUBSTITUTABLE:
