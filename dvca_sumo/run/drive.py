@@ -187,6 +187,7 @@ class Drive:
         outcome = self.outcome()
         return Record(
             ego=self.ego.name,
+            stops=self.ego.stops,
             route=self.ego.route,
             thresholds=self._thresholds,
             sensor_range=self._stack.sensor_range,

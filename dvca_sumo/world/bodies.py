@@ -22,6 +22,7 @@ class Ego:
 
     def __init__(self, entry: Entry, route: Route, limits: VehicleLimits) -> None:
         self.name = entry.ego
+        self.stops = entry.stops
         self.route = route
         self.shape = shape_of(entry)
         axle = np.array([entry.front_x, entry.front_y]) - self.shape.front * np.array(

@@ -63,6 +63,7 @@ class Entry(msgspec.Struct, frozen=True):
     edges: tuple[str, ...]
     lane: str
     position: float  # [m] of the front bumper along the lane
+    stops: tuple[str, ...]  # its own, by stopping place or lane and position; as an ego it does not make them
     parameters: dict[str, str]  # the vehicle's own "dvca." parameters, without that prefix
 
 
@@ -167,16 +168,13 @@ class Session:
             edges=tuple(of.getRoute(vehicle)),
             lane=of.getLaneID(vehicle),
             position=of.getLanePosition(vehicle),
+            stops=tuple(stop.stoppingPlaceID or f"{stop.lane} at {stop.endPos:g} m" for stop in of.getStops(vehicle)),
             parameters={name: text for name, text in texts.items() if text},
         )
 
     def class_of(self, vehicle: str) -> str:
         """The class of a vehicle that is in the simulation."""
         return str(libsumo.vehicle.getVehicleClass(vehicle))
-
-    def has_stops(self, vehicle: str) -> bool:
-        """Whether a vehicle has stops of its own to make."""
-        return bool(libsumo.vehicle.getStops(vehicle, 1))
 
     def motion(self, vehicle: str) -> Motion:
         """How a vehicle moves that SUMO drives."""
@@ -204,6 +202,14 @@ class Session:
         of.setVehicleClass(entry.ego, entry.vehicle_class)
         of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
         self.watch(entry.ego, radius)
+
+    def skip_stops(self, vehicle: str) -> None:
+        """Take its own stops off a vehicle that has just departed; its route stays.
+
+        SUMO would take an ego that passes a parking stop of its own for parked there, to the end of its trip.
+        """
+        for _ in libsumo.vehicle.getStops(vehicle):
+            libsumo.vehicle.replaceStop(vehicle, 0, "")
 
     def watch(self, vehicle: str, radius: float) -> None:
         """Have `objects` ready for a vehicle: what is within `radius` [m] of it."""

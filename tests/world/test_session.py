@@ -236,11 +236,54 @@ def test_an_ego_of_a_class_with_a_lane_of_its_own_keeps_class_and_size(tmp_path:
     assert asked(scenario_file(tmp_path, street, routes), 5, question) == ("bus", 12.0, 2.5)
 
 
-def test_an_ego_passes_the_stops_that_its_route_asks_of_a_driver(tmp_path: Path, street: Path) -> None:
-    stop = '><stop lane="bc_0" endPos="50" duration="60" parking="true"/></trip>'
-    config = scenario_file(tmp_path, street, STANDING.replace("/>", stop))
-    x, _ = asked(config, 80, lambda sumo: sumo.vehicle.getPosition("ego"), speed=10.0)
-    assert x == pytest.approx(watched(config, 80, speed=10.0)[-1].ego.x + 5.0 * 0.82)
+PLACES = (
+    '<busStop id="market" lane="bc_0" startPos="40" endPos="60"/>'
+    '<containerStop id="dock" lane="bc_0" startPos="40" endPos="60"/>'
+    '<chargingStation id="socket" lane="bc_0" startPos="40" endPos="60"/>'
+    '<parkingArea id="yard" lane="bc_0" startPos="40" endPos="60" roadsideCapacity="2"/>'
+)
+ON_LANE = 'lane="bc_0" startPos="40" endPos="60"'
+
+
+@pytest.mark.parametrize(
+    ("stop", "name"),
+    [
+        (f'{ON_LANE} duration="60"', "bc_0 at 60 m"),
+        (f'{ON_LANE} until="90"', "bc_0 at 60 m"),
+        (f'{ON_LANE} duration="60" parking="true"', "bc_0 at 60 m"),
+        (f'{ON_LANE} triggered="true"', "bc_0 at 60 m"),
+        (f'{ON_LANE} speed="3"', "bc_0 at 60 m"),
+        ('busStop="market" duration="60"', "market"),
+        ('containerStop="dock" duration="60"', "dock"),
+        ('chargingStation="socket" duration="60"', "socket"),
+        ('parkingArea="yard" duration="60"', "yard"),
+    ],
+)
+@pytest.mark.parametrize("depart", ["departPos='20'", "departPos='stop'"])
+def test_an_ego_passes_its_stops_as_a_vehicle_on_the_road(
+    tmp_path: Path, street: Path, stop: str, name: str, depart: str
+) -> None:
+    further = '<stop lane="bc_1" endPos="200" duration="9" parking="true"/>'  # of the vehicle; the other is its route's
+    routes = f'<vehicle id="ego" depart="0" {depart}><route edges="bc"><stop {stop}/></route>{further}</vehicle>'
+    config = scenario_file(tmp_path, street, routes, PLACES)
+    assert entered(config).stops == (name, "bc_1 at 200 m")
+
+    def job() -> list[Any]:
+        import libsumo  # noqa: PLC0415
+
+        of, seen = libsumo.vehicle, []
+        step = libsumo.simulationStep
+
+        def noting() -> None:
+            step()
+            seen.append((of.getRoadID("ego"), of.getStopState("ego"), len(of.getStops("ego"))))
+
+        libsumo.simulationStep = noting
+        moments = watch(config, 80, speed=10.0, left=0.0)
+        x, _ = of.getPosition("ego")
+        return [set(seen[1:]), x - moments[-1].ego.x - moments[-1].shape.front]
+
+    assert in_child(job) == [{("bc", 0, 0)}, pytest.approx(0.0)]
 
 
 @pytest.mark.parametrize("step", ["0.5", "1"])
