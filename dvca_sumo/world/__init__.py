@@ -127,7 +127,7 @@ class World:
             ScenarioError: SUMO gave up.
         """
         for ego in self._egos:
-            self._session.place(ego.name, ego.truth, ego.shape.front, ego.lane())
+            self._session.place(ego.name, ego.truth, ego.shape.front, ego.lane(), ego.turn())
         self._session.step()
         lost = tuple(ego for ego in self._egos if not self._session.has(ego.name))
         for ego in lost:

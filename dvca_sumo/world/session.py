@@ -45,6 +45,9 @@ _NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
 _ANY_BRAKING = 1e4  # [m/s^2] SUMO's own driver, overruled, would warn of braking for the arrival at every step
 _MATCHED_WITHIN = 30.0  # [m] of a lane an ego is on the road; SUMO looks at every lane within that
 _GIVES_UP = (libsumo.TraCIException, libsumo.FatalTraCIError)
+_INDICATORS = {1: 0b10, 0: 0, -1: 0b1}  # by the side they tell; bits of SUMO's signals
+_BRAKE_LIGHT = 0b1000
+_STANDING = 0.1  # [m/s] up to which SUMO's vehicles show their brake lights
 _TWO_WHEELED = ("bicycle", "moped", "motorcycle", "scooter")
 
 
@@ -226,10 +229,15 @@ class Session:
             of.unsubscribeContext(vehicle, kind, 0.0)  # else SUMO gives up at the next step
         of.remove(vehicle)
 
-    def place(self, ego: str, truth: EgoTruth, front: float, lane: str) -> None:
+    def place(self, ego: str, truth: EgoTruth, front: float, lane: str, turn: int) -> None:
         """Put the ego where its own dynamics say; effective with the next step.
 
-        `lane` is the lane of the route it is on: without it SUMO may pick a crossing junction lane.
+        Args:
+            ego: The vehicle.
+            truth: How it moves now.
+            front: From its rear axle to its front bumper [m].
+            lane: Of the route, that it is on: without it SUMO may pick a crossing junction lane.
+            turn: Which way it indicates: 1 left, -1 right, 0 not at all.
         """
         edge, _, index = lane.rpartition("_")
         x = truth.x + front * math.cos(truth.heading)
@@ -238,6 +246,8 @@ class Session:
         libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, angle, keepRoute=2, matchThreshold=_MATCHED_WITHIN)
         # SUMO derives a wrong speed on junction and opposite lanes; drivers behind must react to the true one.
         libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
+        # SUMO's own would tell what its driver, overruled, meant to do.
+        libsumo.vehicle.setSignals(ego, _INDICATORS[turn] | (_BRAKE_LIGHT if _is_braking(truth) else 0))
 
     def objects(self, ego: str) -> ObjectsTruth:
         """Every moving body near a watched vehicle: vehicles (parked ones too), people on foot."""
@@ -326,6 +336,11 @@ class _Signals:
             self._states = states
             self._colours = {signal: _COLOURS[states[light][link]] for signal, light, link in self._heads}
         return self._colours
+
+
+def _is_braking(truth: EgoTruth) -> bool:
+    """Whether brake lights are on, as of SUMO's vehicles: slower at once than by rolling."""
+    return truth.speed <= _STANDING or truth.acceleration < -(0.05 + 0.005 * truth.speed) * truth.speed
 
 
 def _turn(domain: Any, name: str) -> tuple[float, float]:
