@@ -31,7 +31,9 @@ class Ego:
         axle = np.array([entry.front_x, entry.front_y]) - self.shape.front * np.array(
             [np.cos(entry.heading), np.sin(entry.heading)]
         )
-        start = EgoTruth(entry.time, float(axle[0]), float(axle[1]), entry.heading, entry.speed, 0.0, 0.0, 0.0)
+        # SUMO's drivers may depart faster than the law allows: that would not be the ADS's doing.
+        speed = min(entry.speed, float(route.speed_limits[_row(route, route.start)]))
+        start = EgoTruth(entry.time, float(axle[0]), float(axle[1]), entry.heading, speed, 0.0, 0.0, 0.0)
         self.vehicle = Vehicle(self.shape, limits, start)
         self.signals = _signals(route)  # ids of the signal heads on its route
         self._turns = _turns(route)
@@ -53,9 +55,8 @@ class Ego:
 
     def lane(self) -> str:
         """The route's lane under its front bumper, for SUMO's map matching."""
-        line = self.route.line
-        front = min(self.station() + self.shape.front, line.length)
-        return self.route.lane_ids[int(line.stations.searchsorted(front, side="right")) - 1]
+        front = min(self.station() + self.shape.front, self.route.line.length)
+        return self.route.lane_ids[_row(self.route, front)]
 
     def turn(self) -> int:
         """Which way it turns at the junction it is on or comes to next: 1 left, -1 right, 0 neither."""
@@ -96,6 +97,11 @@ class Native:
             yaw_rate=wrapped(heading - before) / passed,
             steering=0.0,
         )
+
+
+def _row(route: Route, station: float) -> int:
+    """The row of the route's arrays that holds at a station within it."""
+    return int(route.line.stations.searchsorted(station, side="right")) - 1
 
 
 def _turns(route: Route) -> tuple[tuple[float, float, int], ...]:

@@ -63,7 +63,7 @@ class Entry(msgspec.Struct, frozen=True):
     length: float  # [m]
     width: float  # [m]
     vehicle_class: str
-    edges: tuple[str, ...]
+    edges: tuple[str, ...]  # of its route, from the one it stands on
     lane: str
     position: float  # [m] of the front bumper along the lane
     stops: tuple[str, ...]  # its own, by stopping place or lane and position; as an ego it does not make them
@@ -168,7 +168,7 @@ class Session:
             length=of.getLength(vehicle),
             width=of.getWidth(vehicle),
             vehicle_class=of.getVehicleClass(vehicle),
-            edges=tuple(of.getRoute(vehicle)),
+            edges=tuple(of.getRoute(vehicle)[of.getRouteIndex(vehicle) :]),
             lane=of.getLaneID(vehicle),
             position=of.getLanePosition(vehicle),
             stops=tuple(stop.stoppingPlaceID or f"{stop.lane} at {stop.endPos:g} m" for stop in of.getStops(vehicle)),
