@@ -12,7 +12,14 @@ from dvca_sumo.world.session import Entry, Motion
 from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
 
 _INDICATED = 50.0  # [m] before a junction an ego that turns at it begins to indicate
-_SIDES = {"l": 1, "L": 1, "t": 1, "r": -1, "R": -1, "T": -1}  # of a movement's direction; T: turns about on the left
+_SIDES = {
+    "l": 1,
+    "L": 1,
+    "t": 1,
+    "r": -1,
+    "R": -1,
+    "T": -1,
+}  # of a movement's direction; T: about, in left-hand traffic
 
 
 def shape_of(entry: Entry) -> VehicleShape:
