@@ -39,6 +39,7 @@ class Record(msgspec.Struct):
     """One ego's drive. `path`, `stations` have one entry a tick, `moments` one a world step."""
 
     ego: str
+    stops: tuple[str, ...]  # the vehicle's own, which the ego did not make
     route: Route
     thresholds: Thresholds
     sensor_range: float  # [m] of the stack

@@ -51,6 +51,12 @@ def street(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
+def plain_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """A net file from plain-XML nodes and edges."""
+    return lambda nodes, edges: _converted(tmp_path_factory.mktemp("plain"), nodes, edges)
+
+
+@pytest.fixture(scope="session")
 def grid_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """A grid of 3 x 3 junctions A0 ... C2, 150 m apart, as netgenerate builds it with the options given."""
     built: dict[tuple[str, ...], Path] = {}

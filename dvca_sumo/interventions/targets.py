@@ -4,12 +4,14 @@ import numpy as np
 
 from dvca_sumo.geometry.frames import Pose, transferred
 from dvca_sumo.interventions.selection import Occasion
+from dvca_sumo.interventions.states import UNITS
 from dvca_sumo.messages import Integers, ObjectClass, TrackedObjects
 
 IN_WAY = "in_way"
 ALL = "all"
 
 _GATE = 4.0  # [m] a tracked object further from the true one is not it
+_AROUND = 30.0  # [m] of where its state says the ego is
 _AHEAD = 100.0  # [m] of route that counts as the ego's way
 _MARGIN = 0.3  # [m] beside the ego's body
 _WALKING_AHEAD = np.arange(13) * 0.5  # [s] people are in the way of an ego that they are walking to
@@ -40,7 +42,8 @@ def in_way(occasion: Occasion) -> int | None:
     objects = moment.objects
     if not objects.ids:
         return None
-    own, _ = line.project(np.array([[moment.ego.x, moment.ego.y]]))
+    near_by = occasion.state.position * UNITS.position  # tells the passes of a loop apart
+    own, _ = line.project(np.array([[moment.ego.x, moment.ego.y]]), between=(near_by - _AROUND, near_by + _AROUND))
     front = float(own[0]) + moment.shape.front
     walks = np.flatnonzero(objects.classes == ObjectClass.PEDESTRIAN)
     drives = np.flatnonzero(objects.classes != ObjectClass.PEDESTRIAN)

@@ -42,6 +42,7 @@ def result_of(
         "scenario": {
             "config": str(scenario.configuration.path),
             "ego": record.ego,
+            "stops": list(record.stops),
             "seed": scenario.seed,
             "step_length": STEP_LENGTH,
             "begin": scenario.begin,

@@ -38,6 +38,7 @@ def _lines(found: Attribution, timing: Timing, bug: str | None) -> Iterator[str]
         yield f"{said}. The ego {record.ego} {_came_out(record)} after {_driven(record):.1f} s."
         if found.reason:
             yield f"  because  {found.reason}"
+        yield from _stops(record)
         if found.planted is not None:
             yield f"  planted  {_altered(found.planted)}, to no violation"
         if bug is not None:
@@ -66,6 +67,12 @@ def _what_happened(violation: Violation, record: Record) -> Iterator[str]:
     if others:
         listed = ", ".join(f"{one.kind.replace('_', ' ')} at {one.time:.1f} s" for one in others[:4])
         yield f"  also     {listed}{' ...' if len(others) > 4 else ''}"
+    yield from _stops(record)
+
+
+def _stops(record: Record) -> Iterator[str]:
+    if record.stops:
+        yield f"  stops    not made, the vehicle's own: {', '.join(record.stops)}"
 
 
 def _which_component(found: Attribution) -> Iterator[str]:

@@ -35,6 +35,7 @@ def stop_line(net: NetContents, movement: Movement, station: float, exit_station
         crosses=junction.conflicting(movement),
         exit_station=exit_station,
         stop_signs=_stop_signs(net, movement) if control in STOP_SIGNS else (),
+        direction=movement.direction,
     )
 
 

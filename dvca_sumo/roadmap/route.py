@@ -43,6 +43,7 @@ class StopLine(msgspec.Struct, frozen=True, eq=False):
     crosses: frozenset[str]  # lanes of all movements whose paths conflict
     exit_station: float  # [m] where the route leaves the junction
     stop_signs: tuple[Approach, ...] = ()  # others of conflicting movements, with STOP and ALL_WAY_STOP
+    direction: str = "s"  # of the movement, as `Movement` has it
 
 
 class Crossing(msgspec.Struct, frozen=True, eq=False):

@@ -8,7 +8,7 @@ import numpy as np
 
 from dvca_sumo.oracles import Places, judges
 from dvca_sumo.roadmap import RoadMap, Route, RouteError
-from dvca_sumo.run.drive import Drive, Judging
+from dvca_sumo.run.drive import ARRIVED_WITHIN, Drive, Judging
 from dvca_sumo.run.task import Task
 from dvca_sumo.scenario import Definitions, Scenario, ScenarioError
 from dvca_sumo.stack.reference import StackContext, StackFactory
@@ -19,6 +19,7 @@ _SHORTEST_AUTO_TRIP = 500.0  # [m]
 # Longest allowed duration of a trip, unless the scenario ends before.
 _PATIENCE = 3.0  # times the free-flow travel time ...
 _PATIENCE_BASE = 90.0  # [s] ... plus this
+_FIRST_BRAKING = 0.3  # [s] after its departure no ego has its full braking
 _OFF_ROAD = ("tram", "rail_urban", "rail", "rail_electric", "rail_fast", "cable_car", "subway", "ship", "aircraft")
 
 RoadMapOf = Callable[[str], RoadMap]  # the scenario's map as drivers of a vehicle class see it
@@ -93,9 +94,15 @@ class Departing:
             route = self.route(entry)
         except RouteError as error:
             raise ScenarioError(f"the ego {entry.ego!r} has no drivable route: {error}") from None
+        limits = VehicleLimits()
+        distance = route.destination - route.start
+        stopping = _FIRST_BRAKING * entry.speed + entry.speed**2 / (2.0 * limits.max_braking)
+        if distance <= max(ARRIVED_WITHIN, stopping - ARRIVED_WITHIN):
+            where = f"departs {distance:.1f} m before its destination at {entry.speed:.1f} m/s"
+            raise ScenarioError(f"the ego {entry.ego!r} {where}: too near to drive there and stop")
         judging = self.judging(entry, route)
         stack = self._factory(StackContext(self._roadmap_of(entry.vehicle_class), route, shape_of(entry), task.seed))
-        ego = world.adopt(entry, route, VehicleLimits())
+        ego = world.adopt(entry, route, limits)
         return Drive(ego, stack, judging, task, self.latest(entry, route), is_whole=is_whole)
 
     def _is_fit(self, entry: Entry) -> bool:

@@ -32,7 +32,7 @@ from dvca_sumo.violations import Ending, Judgement, Violation
 from dvca_sumo.world import ControlCommandError, Ego
 
 TICKS_PER_STEP = 10
-_ARRIVED_WITHIN = 3.0  # [m]
+ARRIVED_WITHIN = 3.0  # [m]
 _LOST_BEYOND = 60.0  # [m] past its destination an ego will not come back
 _PHASE_STREAM = 101
 _CHANNELS = {component: component.value for component in COMPONENTS}  # an enum's value is slow to ask for
@@ -187,6 +187,7 @@ class Drive:
         outcome = self.outcome()
         return Record(
             ego=self.ego.name,
+            stops=self.ego.stops,
             route=self.ego.route,
             thresholds=self._thresholds,
             sensor_range=self._stack.sensor_range,
@@ -313,7 +314,7 @@ class Drive:
 
     def _ended(self, moment: Moment) -> Ending | None:
         rule, beyond = self._task.stop, self.ego.station() + self.ego.shape.front - self.ego.route.destination
-        if abs(beyond) <= _ARRIVED_WITHIN and moment.ego.speed == 0.0:
+        if abs(beyond) <= ARRIVED_WITHIN and moment.ego.speed == 0.0:
             return Ending.ARRIVED
         if moment.time >= self._latest - TICK or beyond > _LOST_BEYOND or self._is_stuck:
             return Ending.TIME_OVER

@@ -117,6 +117,8 @@ def _overrides(configuration: Configuration, seed: int, begin: float) -> tuple[O
     step = seconds(options.get("step-length", "1"), "step-length")
     if step > STEP_LENGTH and "default.action-step-length" not in options:
         wanted.append(("default.action-step-length", f"{step:g}", "drivers keep their reaction interval"))
+    if "no-internal-links" in options:
+        wanted.append(("no-internal-links", "false", "junctions are driven over, not jumped"))
     if begin != seconds(options.get("begin", "0"), "begin"):
         wanted.append(("begin", f"{begin:.12g}", "asked for"))
     outputs = {name: _NUMBERED.get(name, os.devnull) for name in configuration.outputs}

@@ -30,7 +30,7 @@ class Trip(msgspec.Struct, frozen=True):
     departs: float  # [s]
     length: float  # [m]
     free_flow: float  # [s] at the speed limits
-    expected: float  # [s] that SUMO's driver took in the plain traffic; from free flow where it had not arrived
+    expected: float  # [s] that SUMO's driver took in the plain traffic; from free flow where that is not known
 
 
 class Draw(msgspec.Struct, frozen=True):
@@ -51,10 +51,10 @@ class _Departure(msgspec.Struct, frozen=True):
 def drawn(scenario: Scenario, count: int) -> Draw:
     """Draw `count` trips, or as many as there are, in this process: one run of SUMO without any ADS.
 
-    A trip is drivable when the vehicle is of a car's class, has no stops of its own, `--ego` accepts its name,
-    its route is at least `SHORTEST` long and can be driven on the map, and it would be over before the
-    scenario's end. The draw goes round the time windows; in each the trip is taken that begins and ends where
-    fewest of those taken before do, among equals the first by a draw keyed by the vehicle's name.
+    A trip is drivable when the vehicle is of a car's class, `--ego` accepts its name, its route is at least
+    `SHORTEST` long and can be driven on the map, and it would be over before the scenario's end. The draw goes
+    round the time windows; in each the trip is taken that begins and ends where fewest of those taken before do,
+    among equals the first by a draw keyed by the vehicle's name.
 
     Raises:
         ScenarioError: SUMO refuses the scenario, or no trip is drivable.
@@ -99,14 +99,12 @@ def _departures(
             vehicle_class = world.class_of(name)
             if vehicle_class not in CARS:
                 refused[f"of class {vehicle_class}"] += 1
-            elif world.has_stops(name):
-                refused["with stops of their own"] += 1
             elif not departing.definitions.has(name):
                 refused["not named in the scenario's files"] += 1
             else:
                 entries[name] = departing.entry(name, world)
         for name in world.arrived():
-            if name in entries:
+            if name in entries and not entries[name].stops:  # which its trip goes without
                 durations[name] = world.time - entries[name].time
     return list(entries.values()), durations, refused
 

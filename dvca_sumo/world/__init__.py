@@ -81,23 +81,21 @@ class World:
         """The class of a vehicle that is under way."""
         return self._session.class_of(vehicle)
 
-    def has_stops(self, vehicle: str) -> bool:
-        """Whether a vehicle that is under way has stops of its own to make."""
-        return self._session.has_stops(vehicle)
-
     def entry(self, vehicle: str, settings: Sequence[str]) -> Entry:
         """How a vehicle that has just departed stands, and its "dvca." parameters among `settings`."""
         return self._session.entry(vehicle, settings)
 
     def adopt(self, entry: Entry, route: Route, limits: VehicleLimits) -> Ego:
-        """Take a departed vehicle out of SUMO's hands."""
+        """Take a vehicle that has just departed out of SUMO's hands, and its own stops off it."""
+        self._session.skip_stops(entry.ego)
         self._session.adopt(entry, RADIUS)
         ego = Ego(entry, route, limits)
         self._egos.append(ego)
         return ego
 
     def watch(self, entry: Entry, route: Route) -> Native:
-        """Look at a departed vehicle that stays in SUMO's hands."""
+        """Look at a vehicle that has just departed and stays in SUMO's hands; like an ego it makes no stops."""
+        self._session.skip_stops(entry.ego)
         self._session.watch(entry.ego, RADIUS)
         return Native(entry, route)
 
@@ -106,7 +104,7 @@ class World:
         if not self._session.has(native.name):
             return False
         motion = self._session.motion(native.name)
-        if not motion.is_on_road or motion.edges != native.edges:
+        if not motion.is_on_road or motion.edges[-len(native.edges) :] != native.edges:
             return False
         native.follow(self.time, motion)
         return True
@@ -129,7 +127,7 @@ class World:
             ScenarioError: SUMO gave up.
         """
         for ego in self._egos:
-            self._session.place(ego.name, ego.truth, ego.shape.front, ego.lane())
+            self._session.place(ego.name, ego.truth, ego.shape.front, ego.lane(), ego.turn())
         self._session.step()
         lost = tuple(ego for ego in self._egos if not self._session.has(ego.name))
         for ego in lost:

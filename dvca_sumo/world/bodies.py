@@ -11,6 +11,16 @@ from dvca_sumo.truth import EgoTruth
 from dvca_sumo.world.session import Entry, Motion
 from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
 
+_INDICATED = 50.0  # [m] before a junction an ego that turns at it begins to indicate
+_SIDES = {
+    "l": 1,
+    "L": 1,
+    "t": 1,
+    "r": -1,
+    "R": -1,
+    "T": -1,
+}  # of a movement's direction; T: about, in left-hand traffic
+
 
 def shape_of(entry: Entry) -> VehicleShape:
     """The body of an ego of which SUMO knows length and width only: axles at 18 % and 78 % of its length."""
@@ -22,14 +32,18 @@ class Ego:
 
     def __init__(self, entry: Entry, route: Route, limits: VehicleLimits) -> None:
         self.name = entry.ego
+        self.stops = entry.stops
         self.route = route
         self.shape = shape_of(entry)
         axle = np.array([entry.front_x, entry.front_y]) - self.shape.front * np.array(
             [np.cos(entry.heading), np.sin(entry.heading)]
         )
-        start = EgoTruth(entry.time, float(axle[0]), float(axle[1]), entry.heading, entry.speed, 0.0, 0.0, 0.0)
+        # SUMO's drivers may depart faster than the law allows: that would not be the ADS's doing.
+        speed = min(entry.speed, float(route.speed_limits[_row(route, route.start)]))
+        start = EgoTruth(entry.time, float(axle[0]), float(axle[1]), entry.heading, speed, 0.0, 0.0, 0.0)
         self.vehicle = Vehicle(self.shape, limits, start)
         self.signals = _signals(route)  # ids of the signal heads on its route
+        self._turns = _turns(route)
         self._station, self._station_time = route.start - self.shape.front, -1.0
 
     @property
@@ -52,11 +66,16 @@ class Ego:
         front = min(self.station() + self.shape.front, line.length)
         change = self.route.lane_change_at(front)
         if change is None:
-            return self.route.lane_ids[int(line.stations.searchsorted(front, side="right")) - 1]
+            return self.route.lane_ids[_row(self.route, front)]
         truth, reach = self.vehicle.truth, self.shape.front
         nose = (truth.x + reach * math.cos(truth.heading), truth.y + reach * math.sin(truth.heading))
         _, offsets = line.project([nose], between=(front - reach, front + reach))
         return change.lanes[change.nearest(front, float(offsets[0]))]
+
+    def turn(self) -> int:
+        """Which way it turns at the junction it is on or comes to next: 1 left, -1 right, 0 neither."""
+        front = self.station() + self.shape.front
+        return next((side for begin, end, side in self._turns if begin <= front <= end), 0)
 
 
 class Native:
@@ -92,6 +111,20 @@ class Native:
             yaw_rate=wrapped(heading - before) / passed,
             steering=0.0,
         )
+
+
+def _row(route: Route, station: float) -> int:
+    """The row of the route's arrays that holds at a station within it."""
+    return int(route.line.stations.searchsorted(station, side="right")) - 1
+
+
+def _turns(route: Route) -> tuple[tuple[float, float, int], ...]:
+    """Where along the route a turn is indicated, from and to [m], and its side as in `Ego.turn`."""
+    return tuple(
+        (line.station - _INDICATED, line.exit_station, _SIDES[line.direction])
+        for line in route.stop_lines
+        if line.direction in _SIDES and line.station < route.destination
+    )
 
 
 def _signals(route: Route) -> tuple[str, ...]:

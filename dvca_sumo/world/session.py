@@ -45,6 +45,9 @@ _NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
 _ANY_BRAKING = 1e4  # [m/s^2] SUMO's own driver, overruled, would warn of braking for the arrival at every step
 _MATCHED_WITHIN = 30.0  # [m] of a lane an ego is on the road; SUMO looks at every lane within that
 _GIVES_UP = (libsumo.TraCIException, libsumo.FatalTraCIError)
+_INDICATORS = {1: 0b10, 0: 0, -1: 0b1}  # by the side they tell; bits of SUMO's signals
+_BRAKE_LIGHT = 0b1000
+_STANDING = 0.1  # [m/s] up to which SUMO's vehicles show their brake lights
 _TWO_WHEELED = ("bicycle", "moped", "motorcycle", "scooter")
 
 
@@ -60,9 +63,10 @@ class Entry(msgspec.Struct, frozen=True):
     length: float  # [m]
     width: float  # [m]
     vehicle_class: str
-    edges: tuple[str, ...]
+    edges: tuple[str, ...]  # of its route, from the one it stands on
     lane: str
     position: float  # [m] of the front bumper along the lane
+    stops: tuple[str, ...]  # its own, by stopping place or lane and position; as an ego it does not make them
     parameters: dict[str, str]  # the vehicle's own "dvca." parameters, without that prefix
 
 
@@ -164,19 +168,16 @@ class Session:
             length=of.getLength(vehicle),
             width=of.getWidth(vehicle),
             vehicle_class=of.getVehicleClass(vehicle),
-            edges=tuple(of.getRoute(vehicle)),
+            edges=tuple(of.getRoute(vehicle)[of.getRouteIndex(vehicle) :]),
             lane=of.getLaneID(vehicle),
             position=of.getLanePosition(vehicle),
+            stops=tuple(stop.stoppingPlaceID or f"{stop.lane} at {stop.endPos:g} m" for stop in of.getStops(vehicle)),
             parameters={name: text for name, text in texts.items() if text},
         )
 
     def class_of(self, vehicle: str) -> str:
         """The class of a vehicle that is in the simulation."""
         return str(libsumo.vehicle.getVehicleClass(vehicle))
-
-    def has_stops(self, vehicle: str) -> bool:
-        """Whether a vehicle has stops of its own to make."""
-        return bool(libsumo.vehicle.getStops(vehicle, 1))
 
     def motion(self, vehicle: str) -> Motion:
         """How a vehicle moves that SUMO drives."""
@@ -205,6 +206,14 @@ class Session:
         of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
         self.watch(entry.ego, radius)
 
+    def skip_stops(self, vehicle: str) -> None:
+        """Take its own stops off a vehicle that has just departed; its route stays.
+
+        SUMO would take an ego that passes a parking stop of its own for parked there, to the end of its trip.
+        """
+        for _ in libsumo.vehicle.getStops(vehicle):
+            libsumo.vehicle.replaceStop(vehicle, 0, "")
+
     def watch(self, vehicle: str, radius: float) -> None:
         """Have `objects` ready for a vehicle: what is within `radius` [m] of it."""
         of = libsumo.vehicle
@@ -220,10 +229,15 @@ class Session:
             of.unsubscribeContext(vehicle, kind, 0.0)  # else SUMO gives up at the next step
         of.remove(vehicle)
 
-    def place(self, ego: str, truth: EgoTruth, front: float, lane: str) -> None:
+    def place(self, ego: str, truth: EgoTruth, front: float, lane: str, turn: int) -> None:
         """Put the ego where its own dynamics say; effective with the next step.
 
-        `lane` is the lane of the route it is on: without it SUMO may pick a crossing junction lane.
+        Args:
+            ego: The vehicle.
+            truth: How it moves now.
+            front: From its rear axle to its front bumper [m].
+            lane: Of the route, that it is on: without it SUMO may pick a crossing junction lane.
+            turn: Which way it indicates: 1 left, -1 right, 0 not at all.
         """
         edge, _, index = lane.rpartition("_")
         x = truth.x + front * math.cos(truth.heading)
@@ -232,6 +246,8 @@ class Session:
         libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, angle, keepRoute=2, matchThreshold=_MATCHED_WITHIN)
         # SUMO derives a wrong speed on junction and opposite lanes; drivers behind must react to the true one.
         libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
+        # SUMO's own would tell what its driver, overruled, meant to do.
+        libsumo.vehicle.setSignals(ego, _INDICATORS[turn] | (_BRAKE_LIGHT if _is_braking(truth) else 0))
 
     def objects(self, ego: str) -> ObjectsTruth:
         """Every moving body near a watched vehicle: vehicles (parked ones too), people on foot."""
@@ -320,6 +336,11 @@ class _Signals:
             self._states = states
             self._colours = {signal: _COLOURS[states[light][link]] for signal, light, link in self._heads}
         return self._colours
+
+
+def _is_braking(truth: EgoTruth) -> bool:
+    """Whether brake lights are on, as of SUMO's vehicles: slower at once than by rolling."""
+    return truth.speed <= _STANDING or truth.acceleration < -(0.05 + 0.005 * truth.speed) * truth.speed
 
 
 def _turn(domain: Any, name: str) -> tuple[float, float]:

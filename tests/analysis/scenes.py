@@ -90,6 +90,7 @@ def drive(
             executions[Component.CONTROL].append(Execution(tick, ControlCommand(who.time, 0.0, 0.0)))
     return Record(
         ego="ego",
+        stops=(),
         route=road(length=600.0, destination=550.0),
         thresholds=Thresholds(),
         sensor_range=80.0,

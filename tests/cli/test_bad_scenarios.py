@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import pytest
 from command_line import assert_one_error, contents, typed
-from small_scenarios import EGO
+from small_scenarios import EGO, scenario_file
 
 from dvca_sumo.cli import ExitCode
 
@@ -110,6 +110,18 @@ def test_it_is_told_in_one_line(case: Broken, scenario: Callable[..., Path]) -> 
     said = typed("run", config, *case.words)
     assert_one_error(said, ExitCode.BAD_INPUT, *case.says)
     assert contents(config.parent) == before
+
+
+@pytest.mark.parametrize(
+    ("command", "says"), [("run", ("'ego' is not allowed to depart",)), ("screen", ("no lane for cars", "rails"))]
+)
+def test_a_net_of_rails_only(
+    tmp_path: Path, plain_file: Callable[..., Path], command: str, says: tuple[str, ...]
+) -> None:
+    nodes = '<node id="a" x="0" y="0"/><node id="b" x="300" y="0"/><node id="c" x="600" y="0"/>'
+    edges = '<edge id="ab" from="a" to="b" allow="rail"/><edge id="bc" from="b" to="c" allow="rail"/>'
+    config = scenario_file(tmp_path, plain_file(nodes, edges), '<trip id="ego" depart="0" from="ab" to="bc"/>')
+    assert_one_error(typed(command, config), ExitCode.BAD_INPUT, *says)
 
 
 def test_a_folder_is_no_scenario(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from dvca_sumo.geometry.polyline import Polyline
+from dvca_sumo.interventions.states import state_of
 from dvca_sumo.interventions.targets import ALL, IN_WAY, in_way, rows_of
 from dvca_sumo.messages import ObjectClass, TrackedObjects
 from interventions.scenes import Thing, ego, estimate, occasion, road, tracked, walker
@@ -104,3 +106,17 @@ def test_the_way_is_the_route_and_not_the_straight_ahead() -> None:
     offroad = occasion([car], who=ego(y=15.0), route=road())
     assert in_way(offroad) is None
     assert np.isclose(offroad.moment.objects.boxes[0, 1], offroad.moment.ego.y)
+
+
+def test_on_a_loop_the_way_is_that_of_the_present_pass() -> None:
+    corners = np.array(
+        [[0, 0], [100, 0], [100, 40], [0, 40], [0, 0], [200, 0]], dtype=np.float64
+    )  # round, then straight on
+    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    stations = np.arange(0.0, lengths[-1] + 0.5, 1.0)
+    line = Polyline(np.column_stack([np.interp(stations, lengths, corners[:, axis]) for axis in (0, 1)]))
+    beyond_the_bend = Thing("beyond", 130.0, 0.0)
+    for station, row in ((60.0, None), (340.0, 0)):
+        state = state_of(station, 10.0, 0.0)
+        passing = occasion([beyond_the_bend], who=ego(x=60.0), route=replace(road(), line=line), state=state)
+        assert in_way(passing) == row

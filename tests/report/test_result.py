@@ -289,6 +289,11 @@ def test_scenario_overrides_and_faults_are_told() -> None:
     assert "end" not in second["selection"]
 
 
+def test_stops_that_the_ego_did_not_make_are_told() -> None:
+    found = attributed(replace(drive(), stops=("bc_0 at 110 m", "market")), lambda _: SAFE)
+    assert told(found)["scenario"]["stops"] == ["bc_0 at 110 m", "market"]
+
+
 def test_timing_counts_every_run() -> None:
     result = perception_missed()
     assert result["timing"]["ratio"] == pytest.approx(4.0)

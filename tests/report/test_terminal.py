@@ -117,6 +117,13 @@ def test_who_made_the_contact_is_visible(contact: Contact, words: str) -> None:
     assert words in line(text(attributed(record, answering(record, {PERCEPTION: FATAL}))), "contact")
 
 
+@pytest.mark.parametrize("found", [explained(), attributed(drive(), lambda _: SAFE)], ids=["violating", "clean"])
+def test_stops_that_the_ego_did_not_make_are_told_in_a_line(found: Attribution) -> None:
+    assert "stops" not in text(found)
+    stopping = replace(found, record=replace(found.record, stops=("bc_0 at 110 m", "market")))
+    assert line(text(stopping), "stops").endswith("not made, the vehicle's own: bc_0 at 110 m, market")
+
+
 def test_further_violations_are_listed_briefly() -> None:
     others = [breach("speed_limit", Category.TRAFFIC_RULE, START + 5.0 + 0.1 * row) for row in range(6)]
     record = faulty_drive(HIT, *others)

@@ -51,6 +51,12 @@ def test_the_world_step_itself_is_no_override(tmp_path: Path, net: Path) -> None
     assert not {"step-length", "default.action-step-length"} & changed.keys()
 
 
+def test_junctions_are_driven_over_even_where_sumo_is_told_to_jump_them(tmp_path: Path, net: Path) -> None:
+    changed = changes(load_scenario(scenario_file(tmp_path, net, no_internal_links="true")))
+    assert changed["no-internal-links"] == ("true", "false")
+    assert "no-internal-links" not in changes(load_scenario(scenario_file(tmp_path, net)))
+
+
 def test_colliding_vehicles_do_not_vanish_whatever_is_configured(tmp_path: Path, net: Path) -> None:
     config = scenario_file(tmp_path, net, collision__action="remove", collision__mingap_factor="1")
     changed = changes(load_scenario(config))

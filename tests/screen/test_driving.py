@@ -75,3 +75,13 @@ def test_sumos_drivers_are_judged_by_the_same_oracles(tmp_path: Path, street: Pa
     assert {(one.violation.kind, one.fault) for one in results["second"].violations} == {("speed_limit", Fault.DRIVER)}
     assert [result.ego for result in results.values() if result.violations] == ["second"]
     assert results["first"].distance > 450.0
+
+
+def test_sumos_drivers_make_no_stops_that_the_ads_does_not_make(tmp_path: Path, street: Path) -> None:
+    scenario = traffic(tmp_path, street, TRAFFIC.replace('duration="9"', 'duration="900"'))
+    trips = [trip for trip in draw(scenario, 10).trips if trip.ego == "stopping"]
+    assert trips[0].expected < 100.0
+    (sumo,) = in_child(partial(anchored, scenario, trips, HEAR)).results
+    (ads,) = drive(scenario, ["stopping"]).results
+    assert (sumo.outcome, ads.outcome) == (Outcome.ARRIVED, Outcome.ARRIVED)
+    assert max(sumo.duration, ads.duration) < 100.0

@@ -1,6 +1,8 @@
 """SUMO's truth in the project's conventions: who is there, where, how big; and what SUMO does to an ego."""
 
+import itertools
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +11,12 @@ import pytest
 from small_scenarios import EGO, in_child, scenario_file
 from watched_world import STANDING, asked, entered, objects_of, watch, watched
 
+from dvca_sumo.engine.replay import roadmap
 from dvca_sumo.messages import ObjectClass, SignalColour
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.run import Task, departed
 from dvca_sumo.scenario import ScenarioError, load_scenario
+from dvca_sumo.stack.reference import reference_stack
 from dvca_sumo.world import World
 
 CAR_IN_THE_WAY = (
@@ -218,6 +224,73 @@ def test_drivers_react_to_the_egos_true_speed_on_a_junction(tmp_path: Path, stre
     assert [speed for _, speed in met] == pytest.approx([10.0] * 40)
 
 
+@pytest.mark.parametrize(("start", "left"), [("bc", 0.0), ("bc", 0.5), ("ab", 0.0)], ids=["lane", "change", "junction"])
+def test_drivers_see_the_egos_true_lane_and_speed(tmp_path: Path, street: Path, start: str, left: float) -> None:
+    position = 20.0 if start == "bc" else 150.0
+    ego = STANDING.replace('from="bc"', f'from="{start}"').replace('"20"', f'"{position}"')
+    config = scenario_file(tmp_path, street, ego)
+
+    def job() -> list[tuple[str, float, tuple[float, float]]]:
+        import libsumo  # noqa: PLC0415
+
+        of, seen = libsumo.vehicle, []
+        step = libsumo.simulationStep
+
+        def noting() -> None:
+            if "ego" in of.getIDList():
+                seen.append((of.getLaneID("ego"), of.getSpeed("ego"), of.getPosition("ego")))
+            step()
+
+        libsumo.simulationStep = noting
+        watch(config, 90, speed=8.0, left=left)
+        return seen
+
+    lanes = RoadMap.load(street).lanes
+    begin, end = lanes["bc_0"].line.points[0, 0], lanes["ab_0"].line.points[-1, 0]
+    seen = in_child(job)[1:]  # before the first it had only been taken over
+    for lane, _, (x, y) in seen:
+        edge = "ab" if x < end else "bc" if x > begin else ":b_14"
+        beyond = y + 3.2  # the border of the two lanes; SUMO leaves the lane that the route has a little later
+        assert 0.0 < beyond < 0.7 or lane == f"{edge}_{int(beyond > 0.0)}"
+    assert len({lane for lane, _, _ in seen}) == {("bc", 0.0): 1, ("bc", 0.5): 2, ("ab", 0.0): 3}[start, left]
+    assert {round(speed, 9) for _, speed, _ in seen} == {8.0}
+
+
+def test_the_ego_shows_when_it_brakes_and_where_it_turns(tmp_path: Path, street: Path) -> None:
+    ego = STANDING.replace('from="bc" to="bc"', 'from="sb" to="ba"').replace('"0" departLane', '"9" departLane')
+    stop = "<trip" + ego.partition("<trip")[2].replace("/>", ' arrivalPos="60"/>')
+    scenario = load_scenario(scenario_file(tmp_path, street, stop, tls__all_off="true"))
+
+    def job() -> list[tuple[float, float, str, int]]:
+        import libsumo  # noqa: PLC0415
+
+        of, seen = libsumo.vehicle, []
+        step = libsumo.simulationStep
+
+        def noting() -> None:
+            is_there = "ego" in of.getIDList()
+            motion = (of.getSpeed("ego"), of.getAcceleration("ego")) if is_there else ()
+            step()
+            if is_there:
+                seen.append((*motion, of.getLaneID("ego"), of.getSignals("ego")))
+
+        libsumo.simulationStep = noting
+        with departed(Task(scenario), partial(roadmap, street), reference_stack) as simulation:
+            simulation.proceed()
+        return seen
+
+    seen = in_child(job)[1:]
+    brakes = [signals & 8 > 0 for *_, signals in seen]
+    assert all(
+        is_lit == (speed < 0.1 or acceleration < -(0.05 + 0.005 * speed) * speed)
+        for (speed, acceleration, _, _), is_lit in zip(seen, brakes, strict=True)
+    )
+    assert {True, False} == set(brakes)
+    indicated = [(lane, signals & 3) for *_, lane, signals in seen]
+    assert [side for side, _ in itertools.groupby(side for _, side in indicated)] == [0, 2, 0]
+    assert {lane for lane, side in indicated if side} == {"sb_0", ":b_11_0", ":b_22_0"}
+
+
 def test_vehicles_that_collide_with_the_ego_are_not_removed(tmp_path: Path, street: Path) -> None:
     config = scenario_file(tmp_path, street, STANDING + CAR_IN_THE_WAY, collision__action="remove")
     moments = watched(config, 70, speed=10.0)
@@ -236,11 +309,54 @@ def test_an_ego_of_a_class_with_a_lane_of_its_own_keeps_class_and_size(tmp_path:
     assert asked(scenario_file(tmp_path, street, routes), 5, question) == ("bus", 12.0, 2.5)
 
 
-def test_an_ego_passes_the_stops_that_its_route_asks_of_a_driver(tmp_path: Path, street: Path) -> None:
-    stop = '><stop lane="bc_0" endPos="50" duration="60" parking="true"/></trip>'
-    config = scenario_file(tmp_path, street, STANDING.replace("/>", stop))
-    x, _ = asked(config, 80, lambda sumo: sumo.vehicle.getPosition("ego"), speed=10.0)
-    assert x == pytest.approx(watched(config, 80, speed=10.0)[-1].ego.x + 5.0 * 0.82)
+PLACES = (
+    '<busStop id="market" lane="bc_0" startPos="40" endPos="60"/>'
+    '<containerStop id="dock" lane="bc_0" startPos="40" endPos="60"/>'
+    '<chargingStation id="socket" lane="bc_0" startPos="40" endPos="60"/>'
+    '<parkingArea id="yard" lane="bc_0" startPos="40" endPos="60" roadsideCapacity="2"/>'
+)
+ON_LANE = 'lane="bc_0" startPos="40" endPos="60"'
+
+
+@pytest.mark.parametrize(
+    ("stop", "name"),
+    [
+        (f'{ON_LANE} duration="60"', "bc_0 at 60 m"),
+        (f'{ON_LANE} until="90"', "bc_0 at 60 m"),
+        (f'{ON_LANE} duration="60" parking="true"', "bc_0 at 60 m"),
+        (f'{ON_LANE} triggered="true"', "bc_0 at 60 m"),
+        (f'{ON_LANE} speed="3"', "bc_0 at 60 m"),
+        ('busStop="market" duration="60"', "market"),
+        ('containerStop="dock" duration="60"', "dock"),
+        ('chargingStation="socket" duration="60"', "socket"),
+        ('parkingArea="yard" duration="60"', "yard"),
+    ],
+)
+@pytest.mark.parametrize("depart", ["departPos='20'", "departPos='stop'"])
+def test_an_ego_passes_its_stops_as_a_vehicle_on_the_road(
+    tmp_path: Path, street: Path, stop: str, name: str, depart: str
+) -> None:
+    further = '<stop lane="bc_1" endPos="200" duration="9" parking="true"/>'  # of the vehicle; the other is its route's
+    routes = f'<vehicle id="ego" depart="0" {depart}><route edges="bc"><stop {stop}/></route>{further}</vehicle>'
+    config = scenario_file(tmp_path, street, routes, PLACES)
+    assert entered(config).stops == (name, "bc_1 at 200 m")
+
+    def job() -> list[Any]:
+        import libsumo  # noqa: PLC0415
+
+        of, seen = libsumo.vehicle, []
+        step = libsumo.simulationStep
+
+        def noting() -> None:
+            step()
+            seen.append((of.getRoadID("ego"), of.getStopState("ego"), len(of.getStops("ego"))))
+
+        libsumo.simulationStep = noting
+        moments = watch(config, 80, speed=10.0, left=0.0)
+        x, _ = of.getPosition("ego")
+        return [set(seen[1:]), x - moments[-1].ego.x - moments[-1].shape.front]
+
+    assert in_child(job) == [{("bc", 0, 0)}, pytest.approx(0.0)]
 
 
 @pytest.mark.parametrize("step", ["0.5", "1"])

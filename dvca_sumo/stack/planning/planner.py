@@ -32,6 +32,7 @@ from dvca_sumo.stack.planning.start import StartState, start_state
 _HORIZON = float(TRAJECTORY_TIMES[-1])  # [s]
 _SPARE = 30.0  # [m] of window beyond what can be driven within the horizon
 _LARGEST_ANGLE = 2.0  # [rad] to the reference line
+_AROUND = 30.0  # [m] of the route's beginning the first start state lies
 _ASTRAY = 0.3  # [rad] between ego and path
 _ROUNDS = 3  # of deciding about meetings: yielding to one may put the ego in the way of the next
 
@@ -66,19 +67,26 @@ class Planner:
         return self._previous
 
     def _locate(self, start: StartState) -> tuple[float, float] | None:
-        """Station and offset on the route, looked for where the ego was before, then anywhere; None off the route."""
+        """Station and offset on the route, looked for where the ego was before, then anywhere; None off the route.
+
+        Before it was anywhere it is where the route begins, which may come by the same place again.
+        """
+        begin = self._route.start - self._shape.front
+        stretches: list[tuple[float, float] | None] = [(begin - _AROUND, begin + _AROUND), None]
         if self._station is not None:
+            stretches = [None]
             located = self._reference.locate(start.x, start.y, self._station)
             if located is not None and self._is_on_route(start, *located[1:]):
                 self._station = located[0]
                 return located[:2]
         line = self._route.line
-        stations, offsets = line.project([[start.x, start.y]])
-        station, offset = float(stations[0]), float(offsets[0])
-        if not self._is_on_route(start, offset, float(line.headings[int(station)])):
-            return None
-        self._station = station
-        return station, offset
+        for between in stretches:
+            stations, offsets = line.project([[start.x, start.y]], between=between)
+            station, offset = float(stations[0]), float(offsets[0])
+            if self._is_on_route(start, offset, float(line.headings[int(station)])):
+                self._station = station
+                return station, offset
+        return None
 
     def _is_on_route(self, start: StartState, offset: float, heading: float) -> bool:
         angle = abs(math.remainder(start.heading - heading, 2.0 * math.pi))
