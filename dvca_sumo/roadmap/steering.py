@@ -1,9 +1,9 @@
 """Turns that no car can follow, drawn as a car can drive them: steering first, then as little off the road as can be.
 
 Some nets draw a right angle, or a turn back, within the width of one lane. There the line becomes a chain
-of short arcs, none sharper than wheels turn, so that the corners of a body whose rear axle follows it
-leave the road as little as possible (nonlinear least squares by Gauss-Newton steps, damped as by
-Levenberg and Marquardt). A driver does the same: swings out, turns the wheel fully, and cuts in.
+of short arcs, none sharper than wheels turn, and none more suddenly, so that the corners of a body whose
+rear axle follows it leave the road as little as possible (nonlinear least squares by Gauss-Newton steps,
+damped as by Levenberg and Marquardt). A driver does the same: swings out, turns the wheel fully, cuts in.
 """
 
 from collections.abc import Iterator
@@ -19,6 +19,9 @@ Integers = npt.NDArray[np.int64]
 
 _UNSTEERABLE = 0.19  # [1/m] a car of 5 m turns at 0.2 with its wheels at 0.55 rad; the rest is for corrections
 _STEERED = 0.18  # [1/m] drawn instead
+_TOO_QUICK = 0.06  # [1/m^2] change of curvature: at 3.5 m/s wheels turn by 0.6 rad/s
+_QUICKEST = 0.05  # [1/m^2] drawn instead
+_REVERSAL = 2.0  # [m] before and after: a shorter kink moves no car off the line
 _FRONT, _REAR, _HALF_WIDTH = 4.1, 0.9, 0.9  # [m] such a car's body around its rear axle
 _CORNERS = np.array([(ahead, side) for ahead in (_FRONT, -_REAR) for side in (_HALF_WIDTH, -_HALF_WIDTH)])
 _CLEARANCE = 0.1  # [m] wanted between a corner and the road's edge
@@ -30,7 +33,7 @@ _ENOUGH = 1e-5  # relative gain of a step that is not worth another one
 
 # Weights. What must hold outweighs the road, the road outweighs what would only be nice.
 _AT_END = 30.0  # [1/m] and [1/rad]
-_TOO_SHARP = 300.0  # [m]
+_TOO_SHARP = 300.0  # [m] and [m^2]: too sharp, too quick
 _OFF_ROAD = 1.0  # [1/m]
 _OFF_LINE = 0.1  # [1/m]
 _CHANGE = 5.0  # [m^2] of curvature along the way
@@ -62,7 +65,7 @@ class _Terms(NamedTuple):
 
 
 def unsteerable(line: Polyline) -> npt.NDArray[np.bool_]:
-    """Which points lie where the line, seen over steps of a metre, is sharper than a car steers."""
+    """Which points lie where the line, seen over steps of a metre, bends more sharply than a car, or more suddenly."""
     stations = line.stations
     near = np.column_stack(
         [line.poses(np.clip(stations + shift, 0.0, line.length))[:, :2] for shift in (-1.0, 0.0, 1.0)]
@@ -70,8 +73,10 @@ def unsteerable(line: Polyline) -> npt.NDArray[np.bool_]:
     before, after = near[:, 2:4] - near[:, :2], near[:, 4:] - near[:, 2:4]
     crosses = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     inner = (stations >= 1.0) & (stations <= line.length - 1.0)
-    sharp: npt.NDArray[np.bool_] = np.abs(np.arctan2(crosses, (before * after).sum(axis=1))) > _UNSTEERABLE
-    return inner & sharp
+    curvatures = np.where(inner, np.arctan2(crosses, (before * after).sum(axis=1)), 0.0)
+    behind, ahead = (np.interp(stations + shift, stations, curvatures) for shift in (-_REVERSAL, _REVERSAL))
+    sharp: npt.NDArray[np.bool_] = np.abs(curvatures) > _UNSTEERABLE
+    return sharp | (np.abs(ahead - behind) > 2.0 * _REVERSAL * _TOO_QUICK)
 
 
 def steered(line: Polyline, sharp: npt.NDArray[np.bool_], left: Floats, right: Floats) -> tuple[Floats, Floats]:
@@ -163,16 +168,22 @@ def _terms(unknowns: Floats, window: _Window, ends: Floats) -> _Terms:
 
 
 def _bending(chain: _Chain) -> _Terms:
-    """Too sharp, and changing too fast; straight before and after."""
+    """Too sharp, too quick, and any change of curvature; straight before and after."""
     count = len(chain.turns)
     curvatures = chain.turns / chain.step
-    over = np.abs(curvatures) - _STEERED
-    weights = np.where(over > 0.0, np.copysign(_TOO_SHARP, curvatures), 0.0)
-    change = _CHANGE / chain.step * np.diff(np.eye(count + 2), axis=0)[:, 1:-1]
-    by_curvature = np.concatenate((np.diag(weights), change))
+    changing = np.diff(np.eye(count + 2), axis=0)[:, 1:-1] / chain.step
+    changes = changing @ curvatures
+    sharp, quick = _excess(curvatures, _STEERED), _excess(changes, _QUICKEST)
+    values = np.concatenate((_TOO_SHARP * sharp, _TOO_SHARP * quick, _CHANGE * changes))
+    weights = np.concatenate((_TOO_SHARP * (sharp != 0.0), _TOO_SHARP * (quick != 0.0), np.full(count + 1, _CHANGE)))
+    by_curvature = weights[:, None] * np.concatenate((np.eye(count), changing, changing))
     slopes = np.column_stack((by_curvature, -by_curvature @ curvatures)) / chain.step
-    slopes[count:, -1] *= 2.0  # a change of curvature is over a step
-    return _Terms(np.concatenate((_TOO_SHARP * np.maximum(over, 0.0), change @ curvatures)), slopes)
+    slopes[count:, -1] *= 2.0  # a change is over a step, too
+    return _Terms(values, slopes)
+
+
+def _excess(values: Floats, most: float) -> Floats:
+    return values - np.clip(values, -most, most)
 
 
 def _arrival(chain: _Chain, end: Floats) -> _Terms:
