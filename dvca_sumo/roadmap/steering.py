@@ -29,7 +29,7 @@ _RUN_UP = 20.0  # [m] before and after a sharp place over which the line may mov
 _STEP = 0.5  # [m] length of an arc, about
 _LEAP = 5.0  # [m] of line at most are abreast of half an arc that cuts a corner
 _ITERATIONS = 60
-_ENOUGH = 1e-5  # relative gain of a step that is not worth another one
+_ENOUGH = 1e-4  # relative gain of a step that is not worth another one
 
 # Weights. What must hold outweighs the road, the road outweighs what would only be nice.
 _AT_END = 30.0  # [1/m] and [1/rad]
