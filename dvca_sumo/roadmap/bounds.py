@@ -12,6 +12,7 @@ from dvca_sumo.roadmap.route import LaneChange
 
 _JUNCTION_MARGIN = 0.5  # [m] of drivable surface beside a lane on a junction
 _EVENED = 5  # [m] to either side over which offsets of lanes are averaged
+_INSIDE = 0.1  # [m] of room there is on either side in any case: a turn too tight for a car takes the line off its lane
 
 
 class Bounds(msgspec.Struct, frozen=True, eq=False):
@@ -34,7 +35,13 @@ def bounds(
         rows = slice(int(np.searchsorted(line.stations, change.begin)), int(np.searchsorted(line.stations, change.end)))
         for lane in change.lanes:
             _put(found, lanes, line, lane, rows, is_first=False)
-    for array in (found.lane_left, found.lane_right, found.road_left, found.road_right):
+    for array, sign in (
+        (found.lane_left, 1.0),
+        (found.lane_right, -1.0),
+        (found.road_left, 1.0),
+        (found.road_right, -1.0),
+    ):
+        array[array * sign < _INSIDE] = sign * _INSIDE
         array.setflags(write=False)
     return found
 

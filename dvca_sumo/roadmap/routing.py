@@ -6,14 +6,15 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.polyline import Floats, Polyline
-from dvca_sumo.roadmap.bounds import bounds, lane_change
+from dvca_sumo.roadmap.bounds import Bounds, bounds, lane_change
 from dvca_sumo.roadmap.drawing import Change, Drawing, Stretch
 from dvca_sumo.roadmap.lane_sequence import Leg, change_length, lane_sequence
 from dvca_sumo.roadmap.lanes import Lane, Movement
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.right_of_way import crossings, stop_line
 from dvca_sumo.roadmap.route import Route, RouteError, UnmappedLimit
-from dvca_sumo.roadmap.smoothing import smoothed
+from dvca_sumo.roadmap.smoothing import smoothed, stepped
+from dvca_sumo.roadmap.steering import steered, unsteerable
 
 _BEFORE = 20.0  # [m] of lane shown behind the start, as far as there is any
 _RUN_UP = 10.0  # [m] of line behind the start in any case: the rear axle needs a line under it
@@ -46,21 +47,14 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
     plan = _drawn(net, lane_sequence(net, edges, start, arrival), start[1], arrival[1])
     begin = min(max(plan.start - _BEFORE, 0.0), plan.start - _RUN_UP)
     end = min(plan.destination + _BEYOND, plan.line.length)
-    line, along = smoothed(_clipped(plan.line, begin, end))
+    line, along = stepped(*_steerable(net, plan, *smoothed(_clipped(plan.line, begin, end)), begin))
     along = along + begin
 
     def moved(station: float) -> float:
         return float(np.interp(station, along, line.stations))
 
-    owners = np.searchsorted([stretch.begin for stretch in plan.stretches], along, side="right") - 1
-    followed = [plan.stretches[owner].lane for owner in np.maximum(owners, 0)]
-    destination = moved(plan.destination)
-    changes = [
-        Change(change.lanes, moved(change.begin), moved(change.end), min(moved(change.latest), destination))
-        for change in plan.changes
-    ]
-    runs = list(_runs(followed))
-    edges_of = bounds(net.lanes, line, runs, changes)
+    followed = _followed(plan, along)
+    edges_of = _bounds(net, plan, line, along)
     passages = [
         _Passage(passage.movement, moved(passage.begin), moved(passage.end))
         for passage in plan.passages
@@ -76,15 +70,17 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
         road_left=edges_of.road_left,
         road_right=edges_of.road_right,
         start=moved(plan.start),
-        destination=destination,
+        destination=moved(plan.destination),
         stop_lines=tuple(stop_line(net, p.movement, p.begin, p.end) for p in passages),
         crossings=tuple(crossing for p in passages for crossing in crossings(net, p.movement, line, p.begin, p.end)),
         unmapped_limits=tuple(
             UnmappedLimit(float(line.stations[rows.start]), float(line.stations[rows.stop - 1]), lane.is_motorway)
-            for lane, rows in runs
+            for lane, rows in _runs(followed)
             if not lane.is_limit_mapped
         ),
-        lane_changes=tuple(lane_change(line, change) for change in changes if change.latest > change.begin),
+        lane_changes=tuple(
+            lane_change(line, change) for change in _changes(plan, line, along) if change.latest > change.begin
+        ),
     )
 
 
@@ -157,6 +153,41 @@ def _draw_leg(net: NetContents, drawing: Drawing, leg: Leg, begin: float, end: f
     wait = min(_SETTLED, 0.1 * (end - begin))
     length = min(change_length(leg.entry, len(lanes) - 1), end - begin - 2.0 * wait)
     return drawing.cross(lanes, (begin + wait, begin + wait + length))
+
+
+def _steerable(net: NetContents, plan: _Plan, points: Floats, along: Floats, begin: float) -> tuple[Floats, Floats]:
+    """The smooth line, drawn anew where no car could follow it; `along` counts from `begin` of the rough line."""
+    line = Polyline(points)
+    sharp = unsteerable(line)
+    if not sharp.any():
+        return points, along
+    room = _bounds(net, plan, line, along + begin)
+    points, stations = steered(line, sharp, room.road_left, room.road_right)
+    return points, np.interp(stations, line.stations, along)
+
+
+def _bounds(net: NetContents, plan: _Plan, line: Polyline, along: Floats) -> Bounds:
+    """The edges along a line whose points lie `along` the rough one [m]."""
+    return bounds(net.lanes, line, list(_runs(_followed(plan, along))), _changes(plan, line, along))
+
+
+def _changes(plan: _Plan, line: Polyline, along: Floats) -> list[Change]:
+    """The lane changes, on a line whose points lie `along` the rough one [m]."""
+
+    def moved(station: float) -> float:
+        return float(np.interp(station, along, line.stations))
+
+    destination = moved(plan.destination)
+    return [
+        Change(change.lanes, moved(change.begin), moved(change.end), min(moved(change.latest), destination))
+        for change in plan.changes
+    ]
+
+
+def _followed(plan: _Plan, along: Floats) -> list[Lane]:
+    """The lane that each of the points `along` the rough line follows."""
+    owners = np.searchsorted([stretch.begin for stretch in plan.stretches], along, side="right") - 1
+    return [plan.stretches[owner].lane for owner in np.maximum(owners, 0)]
 
 
 def _located(line: Polyline, lane: Lane, station: float, span: tuple[float, float]) -> float:

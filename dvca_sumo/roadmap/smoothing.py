@@ -22,8 +22,8 @@ _DOUBLED = 0.6  # [m] between the line's way out to the tip and back
 _TAIL = 0.3  # [m] the last step is this much to this much and a metre
 
 
-def smoothed(rough: Polyline) -> tuple[Polyline, Floats]:
-    """A smooth line along `rough` with points 1 m apart, and the station on `rough` of each of its points [m].
+def smoothed(rough: Polyline) -> tuple[Floats, Floats]:
+    """A smooth line along `rough`: points 0.25 m apart, about, and the station on `rough` of each [m].
 
     Both ends stay. Wider and wider Gaussian kernels are applied wherever the line stays within 0.25 m
     of the rough one (0.6 m around tight turns); a kernel of standard deviation s turns a kink of angle
@@ -44,8 +44,7 @@ def smoothed(rough: Polyline) -> tuple[Polyline, Floats]:
         strays = _widened(np.hypot(gaps[:, 0], gaps[:, 1]) > limits, 3.0 * width)
         share = _convolved(1.0 - strays[:, None].astype(float), 0.5 * width)
         points = points + share * (wider - points)
-    points = _convolved(eased(points, original, tight, _TIGHT_DEVIATION, _FINE), _KERNELS[0])
-    return _stepped(points, along)
+    return _convolved(eased(points, original, tight, _TIGHT_DEVIATION, _FINE), _KERNELS[0]), along
 
 
 def _resampled(points: Floats, along: Floats) -> tuple[Floats, Floats]:
@@ -118,7 +117,7 @@ def _convolved(values: Floats, width: float) -> Floats:
     return np.column_stack([np.convolve(column, kernel, mode="valid") for column in padded.T])
 
 
-def _stepped(points: Floats, along: Floats) -> tuple[Polyline, Floats]:
+def stepped(points: Floats, along: Floats) -> tuple[Polyline, Floats]:
     """Points cut into straight steps, not arcs, of 1 m: stations of the result are whole numbers."""
     picked = [0.0]
     xs, ys = points.T.tolist()

@@ -30,7 +30,7 @@ def edge_lists(path: Path) -> list[list[str]]:
         ("mantes_la_jolie/mantes.net.xml.gz", "mantes_la_jolie/mantes.rou.xml.gz"),
     ],
 )
-def test_every_sampled_route_is_sound_and_can_mostly_be_driven(net: str, routes: str) -> None:
+def test_every_sampled_route_is_sound_and_can_be_steered_by_a_car(net: str, routes: str) -> None:
     roadmap = RoadMap.load(SCENARIOS / net)
     curvatures = []
     for edges in edge_lists(SCENARIOS / routes):
@@ -41,4 +41,4 @@ def test_every_sampled_route_is_sound_and_can_mostly_be_driven(net: str, routes:
         assert np.abs(np.diff(route.line.headings)).max() < 1.5
         curvatures.append(np.abs(route.curvatures))
     assert len(curvatures) > 20
-    assert (np.concatenate(curvatures) > 0.25).mean() < 0.01
+    assert np.concatenate(curvatures).max() < 0.2

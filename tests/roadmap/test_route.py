@@ -69,16 +69,6 @@ def test_turn_at_a_junction_can_be_driven(grid: NetBuilder) -> None:
     assert any(lane.startswith(":B0_") for lane in route.lane_ids)
 
 
-def test_corner_too_tight_for_a_car_is_drawn_wider_but_within_the_lane(grid: NetBuilder) -> None:
-    roadmap = grid()
-    route = roadmap.route(["B0A0", "A0A1"], "B0A0_0", 30.0, None, 100.0)
-    check_sound(route)
-    assert np.abs(route.curvatures).max() < 0.45  # 0.67 in the net
-    lanes = [roadmap.lanes[lane].line for lane in dict.fromkeys(route.lane_ids)]
-    away = np.min([np.abs(line.project(route.line.points)[1]) for line in lanes], axis=0)
-    assert 0.3 < away.max() < 0.7
-
-
 def test_speed_limit_is_that_of_the_lane(grid: NetBuilder) -> None:
     roadmap = grid()
     route = roadmap.route(["A0B0", "B0B1"], "A0B0_0", 5.0, None, 100.0)
