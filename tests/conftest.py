@@ -53,7 +53,7 @@ def street(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def plain_file(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """A net file from plain-XML nodes and edges."""
-    return lambda nodes, edges: _converted(tmp_path_factory.mktemp("plain"), nodes, edges)
+    return lambda *parts: _converted(tmp_path_factory.mktemp("plain"), *parts)
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,58 @@
+"""A healthy ego that has to change lanes for its route in dense traffic, on real libsumo."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from small_scenarios import driven, scenario_file
+
+from dvca_sumo.violations import Ending
+
+# Three lanes, of which the leftmost alone turns left.
+NODES = "".join(
+    f'<node id="{name}" x="{x}" y="{y}"/>'
+    for name, x, y in (("a", 0, 0), ("b", 500, 0), ("c", 900, 0), ("d", 500, 300))
+)
+EDGES = "".join(
+    f'<edge id="{name}" from="{name[0]}" to="{name[1]}" numLanes="{lanes}" speed="13.9"/>'
+    for name, lanes in (("ab", 3), ("bc", 2), ("bd", 1))
+)
+CONNECTIONS = "".join(
+    f'<connection from="ab" to="{to}" fromLane="{lane}" toLane="{onto}"/>'
+    for to, lane, onto in (("bc", 0, 0), ("bc", 1, 1), ("bd", 2, 0))
+)
+EGO = '<vehicle id="ego" depart="40" departLane="0" departSpeed="max"><route edges="ab bd"/></vehicle>'
+
+
+def flow(lane: int, period: float) -> str:
+    edges = "ab bd" if lane == 2 else "ab bc"
+    return (
+        f'<flow id="on{lane}" begin="{lane}" end="160" period="{period}" departLane="{lane}" departSpeed="max">'
+        f'<route edges="{edges}"/></flow>'
+    )
+
+
+@pytest.mark.parametrize("period", [3.0, 5.0])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_ego_gets_over_two_lanes_to_its_turn_without_troubling_anybody(
+    tmp_path: Path, plain_file: Callable[..., Path], period: float, seed: int
+) -> None:
+    traffic = flow(0, period) + flow(1, period) + flow(2, period)
+    config = scenario_file(tmp_path, plain_file(NODES, EDGES, CONNECTIONS), traffic + EGO)
+    record = driven(config, seed=seed)
+    assert record.violations == []
+    assert record.ending is Ending.ARRIVED
+    assert [len(change.lanes) for change in record.route.lane_changes] == [3]
+
+
+def test_ego_waits_in_its_lane_when_nobody_leaves_a_gap(tmp_path: Path, plain_file: Callable[..., Path]) -> None:
+    parked = "".join(
+        f'<vehicle id="q{row}" depart="0" departLane="2" departPos="{495 - 7 * row}"><route edges="ab bd"/>'
+        f'<stop lane="ab_2" startPos="{488 - 7 * row}" endPos="{495 - 7 * row}" duration="500"/></vehicle>'
+        for row in range(60)
+    )
+    config = scenario_file(tmp_path, plain_file(NODES, EDGES, CONNECTIONS), parked + EGO, end="110")
+    record = driven(config)
+    assert record.path[-1].speed == 0.0
+    assert not any(one.kind == "collision" for one in record.violations)
+    assert 400.0 < record.path[-1].x < 500.0
