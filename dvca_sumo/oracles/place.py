@@ -13,7 +13,7 @@ from dvca_sumo.truth import Moment, ObjectsTruth
 
 OFF_ROUTE = 15.0  # [m] farther from its line than this the ego is no longer on the route
 
-_BACK, _AHEAD = 20.0, 30.0  # [m] searched around the last known station, so that a route may cross itself
+_BACK, _AHEAD = 20.0, 8.0  # [m] searched around the last known station: a route may soon come by the same place again
 _BESIDE = 30.0  # [m] beyond which what is behind the ego, or just out of reach, need not be told apart
 _FASTEST = 60.0  # [m/s] the search window grows so fast while the ego is off its route
 

@@ -11,6 +11,7 @@ from dvca_sumo.truth import EgoTruth
 from dvca_sumo.world.session import Entry, Motion
 from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
 
+_SEARCHED = 10.0  # [m] along the route: no ego gets farther in a world step, and a route may come by again soon
 _INDICATED = 50.0  # [m] before a junction an ego that turns at it begins to indicate
 _SIDES = {
     "l": 1,
@@ -55,7 +56,7 @@ class Ego:
         """Where its rear axle is along the route [m]; asked for once a world step at least."""
         truth = self.vehicle.truth
         if truth.time != self._station_time:
-            window = (self._station - 20.0, self._station + 30.0)
+            window = (self._station - _SEARCHED, self._station + _SEARCHED)
             self._station = self.route.line.station(truth.x, truth.y, between=window)
             self._station_time = truth.time
         return self._station
