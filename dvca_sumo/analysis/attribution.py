@@ -14,13 +14,14 @@ from dvca_sumo.analysis.components import (
     Verdict,
     concluded,
     named_instead,
+    planning_named_instead,
     responsible_component,
 )
 from dvca_sumo.analysis.differences import Difference, differences
 from dvca_sumo.analysis.dtest import Dtest, Probe, Question, Setting
 from dvca_sumo.analysis.last_chance import decisive, is_by_luck
 from dvca_sumo.analysis.messages import MessageAnswer
-from dvca_sumo.analysis.specification import first_violating_plan
+from dvca_sumo.analysis.specification import PlanningFinding, first_unusable_plan, first_violating_plan
 from dvca_sumo.analysis.violating import principal
 from dvca_sumo.engine.protocol import Engine, RunFailedError
 from dvca_sumo.interventions import Fault, recorded_futures
@@ -36,6 +37,9 @@ SETTLE = 4.0  # [s]
 # ... or so long, when by then it has left the place of the factual violation behind.
 LEAST_SETTLE = 2.5  # [s]
 PAST = 10.0  # [m]
+_USABLE = (
+    1.0  # [s] before the last chance of who is named, up to the violation, there must be plans that one can follow
+)
 _FURTHER = 60.0  # [s] the factual run goes on for past its first violation, to show what else happens
 _HORIZON = float(PREDICTION_TIMES[-1])  # [s] the factual run goes on for, so that its last futures are whole
 
@@ -228,6 +232,10 @@ def _planning_message(found: Attribution, engine: Engine) -> Attribution:
     if finding is None:
         reason = f"{found.reason}; no planning message by itself breaks the specification"
         return replace(found, reason=reason)
+    return _with_plan(found, finding)
+
+
+def _with_plan(found: Attribution, finding: PlanningFinding) -> Attribution:
     return replace(found, message=finding.mark, differences=(Difference("trajectory", finding.reason, 0.0),))
 
 
@@ -241,9 +249,14 @@ def _decided(found: Attribution, dtest: Dtest, engine: Engine, *, is_exact: bool
         return _planning_message(
             replace(found, verdict=answer.verdict, reason=answer.reason, components=answer), engine
         )
+    mark = messages.last_safe
+    broken = first_unusable_plan(record, mark.time - _USABLE, violation.time)
+    if broken is not None:
+        answer = planning_named_instead(answer)
+        found = replace(found, verdict=answer.verdict, reason=answer.reason, components=answer)
+        return _with_plan(found, broken)
     if component is not answer.component:
         answer = named_instead(answer, component)
-    mark = messages.last_safe
     return replace(
         found,
         reason=answer.reason,
@@ -260,7 +273,7 @@ def _certified(found: Attribution, witness: Dtest) -> Attribution:
     if answer is None or answer.component is None:
         return found
     if found.verdict is Verdict.PLANNING:
-        certificate = certified(witness, (), SUBSTITUTABLE, Outcome.VIOLATES)
+        certificate = certified(witness, (), SUBSTITUTABLE, answer.all_ideal)
     else:
         certificate = certified(witness, found.evidence, (answer.component,), Outcome.SAFE)
     if all(check.agrees for check in certificate):

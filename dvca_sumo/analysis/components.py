@@ -176,3 +176,15 @@ def named_instead(answer: ComponentAnswer, component: Component) -> ComponentAns
         alternatives=tuple(one for one in SUBSTITUTABLE if one in enough),
         reason=f"ideal {component} alone prevents it, and still does when it is too late for {answer.component}",
     )
+
+
+def planning_named_instead(answer: ComponentAnswer) -> ComponentAnswer:
+    """The same vector, where planning put out what nobody can follow: who saves the ego from that is not to blame."""
+    enough = tuple(one for one in SUBSTITUTABLE if answer.singles[one] is Outcome.SAFE)
+    return msgspec.structs.replace(
+        answer,
+        verdict=Verdict.PLANNING,
+        component=Component.PLANNING,
+        alternatives=enough,
+        reason=f"ideal {', '.join(enough)} prevents it, but planning put out what cannot be followed",
+    )

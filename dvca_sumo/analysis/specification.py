@@ -17,7 +17,7 @@ from dvca_sumo.messages import ACCELERATION, CURVATURE, HEADING, SPEED, Componen
 from dvca_sumo.oracles import Places, judge, judges
 from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.oracles.no_progress import NoProgress
-from dvca_sumo.record import MessageMark, Record
+from dvca_sumo.record import Execution, MessageMark, Record
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import EgoTruth, Moment
@@ -52,9 +52,9 @@ def first_violating_plan(
         mark = record.mark(MessageId(Component.PLANNING, index))
         if mark.time > violation.time:
             return None
+        reason = _unusable(record, execution)
         if not isinstance(execution.message, Trajectory):
-            return PlanningFinding(mark, "no trajectory was published")
-        reason = _discontinuity(record, execution.message, execution.tick)
+            return PlanningFinding(mark, reason)
         if not reason and violation.category is Category.MISSION and violation.kind != Destination.overrun:
             moment = record.moment_at(execution.tick)
             waiting.observe(moment)  # it follows the ego along its route
@@ -66,6 +66,21 @@ def first_violating_plan(
         if reason:
             return PlanningFinding(mark, reason)
     return None
+
+
+def first_unusable_plan(record: Record, since: float, until: float) -> PlanningFinding | None:
+    """The first planning message between two times [s] that nobody can follow: none, or one that begins elsewhere."""
+    for index, execution in enumerate(record.executions[Component.PLANNING]):
+        mark = record.mark(MessageId(Component.PLANNING, index))
+        if since <= mark.time <= until and (reason := _unusable(record, execution)):
+            return PlanningFinding(mark, reason)
+    return None
+
+
+def _unusable(record: Record, execution: Execution) -> str:
+    if not isinstance(execution.message, Trajectory):
+        return "no trajectory was published"
+    return _discontinuity(record, execution.message, execution.tick)
 
 
 def _discontinuity(record: Record, trajectory: Trajectory, tick: int) -> str:

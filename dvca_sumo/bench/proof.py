@@ -4,7 +4,7 @@ from dvca_sumo.analysis.attribution import Attribution, setting_of
 from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.analysis.components import SUBSTITUTABLE
 from dvca_sumo.analysis.dtest import Dtest, Question
-from dvca_sumo.analysis.specification import first_violating_plan
+from dvca_sumo.analysis.specification import first_unusable_plan, first_violating_plan
 from dvca_sumo.api import FactualDrive
 from dvca_sumo.messages import Component, MessageId
 
@@ -13,14 +13,17 @@ def is_proven(drive: FactualDrive, found: Attribution) -> bool:
     """Whether the definition of the violation-inducing message holds of the one that was reported.
 
     Of a planning message: it is the first that breaks the specification by itself, and the violation stays
-    when everything else is ideal from the start. Of any other: ideal from it on, the component prevents the
-    violation; ideal from the next on, it does not (Definition 11). The runs begin at time 0.
+    when everything else is ideal from the start; or nobody can follow it at all. Of any other: ideal from it
+    on, the component prevents the violation; ideal from the next on, it does not (Definition 11). The runs
+    begin at time 0.
     """
     mark, violation, record = found.message, found.violation, found.record
     if mark is None or violation is None:
         return False
     dtest = Dtest(drive.engine.witness, setting_of(drive.request, record, violation), lambda _probe: None)
     if mark.component is Component.PLANNING:
+        if first_unusable_plan(record, mark.time, mark.time) is not None:
+            return True
         first = first_violating_plan(record, drive.engine.roadmap, record.thresholds, violation)
         return first is not None and first.mark == mark and dtest.ask(Question(SUBSTITUTABLE)) is Outcome.VIOLATES
     following = mark.index + 1

@@ -76,6 +76,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     pass_margin_prior: float = 0.5  # [s] ahead of someone who should have waited but cannot
     pass_hold: float = 0.5  # [s] less margin is accepted by a decision already taken
     clear_margin: float = 0.5  # [s] behind someone who has crossed
+    expected_reaction: float = 0.5  # [s] of those who have to give way to the ego
     expected_braking: float = 3.0  # [m/s^2] of those who have to give way to the ego
     give_way_speed: float = 8.0  # [m/s] at a line where others may have priority
 

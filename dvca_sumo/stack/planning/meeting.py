@@ -9,11 +9,12 @@ import numpy as np
 from dvca_sumo.messages import ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView, has_priority
-from dvca_sumo.stack.planning.scene import Flags, Scene
+from dvca_sumo.stack.planning.scene import SOON, SOON_TIME, Flags, Scene
 from dvca_sumo.stack.planning.speed import STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import ALONG, PRESENT, Graph
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
+_SPEEDS_UP = 0.4  # [m/s] faster over the next second than now
 _CUTS_IN = 0.5  # [m] moved sideways before the meeting: the other comes into our lane, not we into theirs
 _STAYS = 2  # columns of the graph, after which somebody is on the path to drive along it
 _HARD_GAP = 0.5  # [m] to the other's way, defended by hard braking
@@ -68,7 +69,7 @@ class Meetings:
         if others_first is False:
             if self._cuts_in(row, graph, scene):
                 return self._cut_in(row, graph, scene, profile)
-            if entry > PRESENT and scene.speeds[owner] / (2.0 * entry) < config.expected_braking:
+            if self._will_wait(row, entry, scene):
                 return None
         margin = config.pass_margin_prior
         if others_first:
@@ -83,6 +84,19 @@ class Meetings:
         if is_too_late and self._passes([row], graph, scene, profile, 0.0)[0]:
             return None
         return Demand(row, stop, follows=self._joins(row, graph, scene))
+
+    def _will_wait(self, row: int, entry: float, scene: Scene) -> bool:
+        """Whether who has to give way, and is on the path at `entry` [s], may still stop: unless it speeds up."""
+        config, speed = self._config, float(scene.speeds[scene.owners[row]])
+        left = entry - config.expected_reaction
+        if entry <= PRESENT or speed > 2.0 * max(left, 0.0) * config.expected_braking:
+            return False
+        futures = scene.futures
+        way = math.hypot(
+            float(futures.stations[row, SOON] - futures.stations[row, 0]),
+            float(futures.offsets[row, SOON] - futures.offsets[row, 0]),
+        )
+        return way < (speed + _SPEEDS_UP) * SOON_TIME
 
     def _passes(self, rows: list[int], graph: Graph, scene: Scene, profile: Profile, margin: float) -> Flags:
         """Whether the ego has left every place that a future occupies `margin` [s] before it comes there."""

@@ -13,8 +13,8 @@ from dvca_sumo.stack.planning.reference import BEHIND, Window
 Flags = npt.NDArray[np.bool_]
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
-_SOON = int(np.searchsorted(PREDICTION_TIMES, 1.0))  # far enough to tell going from staying, too near for a guess
-_SOON_TIME = float(PREDICTION_TIMES[_SOON])  # [s]
+SOON = int(np.searchsorted(PREDICTION_TIMES, 1.0))  # far enough to tell going from staying, too near for a guess
+SOON_TIME = float(PREDICTION_TIMES[SOON])  # [s]
 _SPARSE = 4  # every so many times of a hypothesis do to bound it
 _FEW = 8  # hypotheses are placed in less time than it takes to find out which are far away
 _AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
@@ -89,8 +89,8 @@ def scene_in(
 
 def _foreseen_speeds(predicted: PredictedObjects, counts: Flags) -> Floats:
     """Mean speed (n,) [m/s] over the next second in the fastest hypothesis that counts; 0 without any."""
-    moved = predicted.poses[:, _SOON, :2] - predicted.poses[:, 0, :2]
-    foreseen = np.hypot(moved[:, 0], moved[:, 1]) / _SOON_TIME
+    moved = predicted.poses[:, SOON, :2] - predicted.poses[:, 0, :2]
+    foreseen = np.hypot(moved[:, 0], moved[:, 1]) / SOON_TIME
     speeds = np.zeros(len(predicted.objects.ids))
     np.maximum.at(speeds, predicted.owners[counts], foreseen[counts])
     return speeds
