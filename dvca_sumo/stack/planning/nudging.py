@@ -184,9 +184,13 @@ class NudgeDecider:
         return self._is_free(offset, band, situation.speed, situation.scene)
 
     def _is_in_traffic(self, blocker: _Blocker, situation: Situation) -> bool:
-        """Who was seen driving and now stands in the middle of our lane has a reason that may be out of sight."""
+        """Who was seen driving and now stands in the middle of our lane, with a junction ahead, may be in a queue.
+
+        However far ahead of it, and out of sight, that begins.
+        """
         offset = abs(float(situation.scene.now.offsets[blocker.row]))
-        return blocker.track in self._driven and offset < _IN_LANE
+        has_junction = any(view.distance + self._shape.front > blocker.high for view in situation.views)
+        return blocker.track in self._driven and offset < _IN_LANE and has_junction
 
     def _is_queueing(self, blocker: _Blocker, situation: Situation) -> bool:
         """A vehicle in our lane may just wait, however long it has stood: near a line, or behind one that waits."""
