@@ -24,6 +24,7 @@ from analysis.scenes import (
     faulty_drive,
     glimpse,
     ideals,
+    saying,
     unknown,
 )
 from dvca_sumo.analysis.attribution import (
@@ -41,12 +42,12 @@ from dvca_sumo.analysis.dtest import Probe, Question
 from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Glimpse, RunFailedError
 from dvca_sumo.interventions import planted_fault
-from dvca_sumo.messages import PREDICTION_TIMES, Component, Trajectory
+from dvca_sumo.messages import PREDICTION_TIMES, Component, MessageId, Trajectory
 from dvca_sumo.record import Record
 from dvca_sumo.run import StopRule, Task
 from dvca_sumo.stack.reference import StackError
 from dvca_sumo.truth import EgoTruth
-from dvca_sumo.violations import Category
+from dvca_sumo.violations import Category, Ending
 
 PERCEPTION, PREDICTION, CONTROL = Component.PERCEPTION, Component.PREDICTION, Component.CONTROL
 
@@ -334,3 +335,21 @@ def test_the_contact_and_not_the_close_call_before_it_is_explained() -> None:
     record = faulty_drive(close, HIT)
     assert attributed(record, answering(record, {PERCEPTION: FATAL})).violation == HIT
     assert collision(START).kind == "collision"
+
+
+@pytest.mark.parametrize("before", [1.0, 30.0])
+def test_who_could_have_saved_the_ego_from_a_missing_plan_is_not_to_blame(before: float) -> None:
+    """Unless the plan was missing long before anybody's last chance."""
+    record = drive([WALKER], duration=44.0, violations=[collision(START + 40.0, "person:ped")], ending=Ending.CUT)
+    missing = record.first_at(Component.PLANNING, START + 40.0 - before)
+    record = saying(record, MessageId(Component.PLANNING, missing), None)
+    enough = answering(record, {Component.PREDICTION: record.first_at(Component.PREDICTION, START + 39.0)})
+    found = attributed(record, enough)
+    assert found.components is not None
+    assert found.components.alternatives == ((Component.PREDICTION,) if before == 1.0 else ())
+    if before == 1.0:
+        assert found.verdict is Verdict.PLANNING
+        assert found.message == record.mark(MessageId(Component.PLANNING, missing))
+        assert found.components.all_ideal is Outcome.SAFE
+    else:
+        assert found.components.component is Component.PREDICTION

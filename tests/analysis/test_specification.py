@@ -6,7 +6,7 @@ from interventions.scenes import Thing, estimate, trajectory, walker
 from msgspec.structs import replace
 
 from analysis.scenes import BARE_MAP, START, breach, collision, drive, saying
-from dvca_sumo.analysis.specification import FORESIGHT, PlanningFinding, first_violating_plan
+from dvca_sumo.analysis.specification import FORESIGHT, PlanningFinding, first_unusable_plan, first_violating_plan
 from dvca_sumo.messages import SPEED, Component, MessageId, Trajectory, X, Y
 from dvca_sumo.record import Record
 from dvca_sumo.thresholds import Thresholds
@@ -184,3 +184,19 @@ def test_for_no_progress_only_plans_of_the_judged_standstill_count() -> None:
 
 def test_a_plan_to_stand_is_not_to_blame_for_an_overrun() -> None:
     assert first(still(drive(plan=standing)), breach("destination_overrun", Category.MISSION, START + 5.0)) is None
+
+
+def test_a_plan_that_nobody_can_follow_is_found_in_its_time_alone() -> None:
+    record = saying(drive([WALL], plan=stopping), MessageId(PLANNING, 20), None)
+    found = first_unusable_plan(record, START + 1.5, START + 2.5)
+    assert found is not None
+    assert found.mark.index == 20
+    assert first_unusable_plan(record, START + 2.05, START + 4.0) is None
+    assert first_unusable_plan(record, START, START + 1.95) is None
+
+
+def test_a_plan_that_begins_beside_the_ego_cannot_be_followed_and_one_into_a_wall_can() -> None:
+    beside_it = first_unusable_plan(drive([WALL], plan=beside(1.5)), START, START + 1.0)
+    assert beside_it is not None
+    assert "1.5 m to the left" in beside_it.reason
+    assert first_unusable_plan(drive([WALL]), START, START + 4.4) is None
