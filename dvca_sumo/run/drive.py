@@ -7,8 +7,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.randomness import uniforms
-from dvca_sumo.interventions import Fault, Gate, Intervention, Occasion, state_of
-from dvca_sumo.interventions.effects import EFFECTS
+from dvca_sumo.interventions import Occasion, state_of
 from dvca_sumo.messages import (
     COMPONENTS,
     Component,
@@ -23,8 +22,8 @@ from dvca_sumo.messages import (
 from dvca_sumo.oracles import Oracle, Places
 from dvca_sumo.oracles.no_progress import NoProgress
 from dvca_sumo.record import TICK, Digest, Execution, Record, moved_on
+from dvca_sumo.run.intervening import Intervening
 from dvca_sumo.run.task import Task
-from dvca_sumo.stack.ideal import SUBSTITUTES
 from dvca_sumo.stack.reference import Stack, StackError
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import EgoTruth, Moment
@@ -87,10 +86,7 @@ class Drive:
         self._task = task
         self._latest = latest
         self._due = _due(task)
-        self._interventions = {
-            component: [(one, Gate(one.selection)) for one in task.interventions if one.component == component]
-            for component in COMPONENTS
-        }
+        self._intervening = Intervening(task.interventions)
         self._channels = Channels()
         self._steps = {
             Component.LOCALIZATION: self._localize,
@@ -106,13 +102,10 @@ class Drive:
         self._ending: Ending | None = None
         self._executions: dict[Component, list[Execution]] = {component: [] for component in COMPONENTS}
         self._forgotten = dict.fromkeys(COMPONENTS, 0)  # how many before those
-        self._altered: dict[Component, list[int]] = {component: [] for component in COMPONENTS}
         self._path: list[EgoTruth] = []
         self._stations: list[float] = []
         self._moments: list[Moment] = []
         self._violations: list[Violation] = []
-        self._substituted: float | None = None  # [s] time of the first substituted message
-        self._tracks: dict[str, int] = {}  # see Occasion
         self._digest = Digest()
         self._digests: list[bytes] = []
 
@@ -128,13 +121,7 @@ class Drive:
 
     def branch(self, task: Task) -> None:
         """Go on under another task; interventions that both have keep what they remember."""
-        for component in COMPONENTS:
-            old = self._interventions[component]
-            self._interventions[component] = [
-                (one, next((gate for known, gate in old if known == one), Gate(one.selection)))
-                for one in task.interventions
-                if one.component == component
-            ]
+        self._intervening.go_on(task.interventions)
         self._task = task
 
     def cycle(self, moment: Moment) -> bool:
@@ -193,7 +180,7 @@ class Drive:
             sensor_range=self._stack.sensor_range,
             start=self._start,
             executions=self._executions,
-            altered=self._altered,
+            altered=self._intervening.altered,
             path=self._path,
             stations=self._stations,
             moments=self._moments,
@@ -201,7 +188,7 @@ class Drive:
             judgements=outcome.judgements,
             ending=outcome.ending,
             simulated=simulated,
-            substituted=self._substituted,
+            substituted=self._intervening.substituted,
             digests=self._digests,
         )
 
@@ -223,17 +210,18 @@ class Drive:
         if message is None:  # its input has not arrived yet
             return
         published: Message | None = message
-        if self._interventions[component]:
-            published = self._intervened(component, self._forgotten[component] + len(made), message, moment)
+        if self._intervening.concern(component):
+            index = self._forgotten[component] + len(made)
+            published = self._intervening.published(message, self._occasion(component, index, message, moment))
         made.append(Execution(self._tick, published))
         if published is not None:
             setattr(self._channels, _CHANNELS[component], published)
 
-    def _intervened(self, component: Component, index: int, message: Message, moment: Moment) -> Message | None:
+    def _occasion(self, component: Component, index: int, message: Message, moment: Moment) -> Occasion:
         truth = self._path[-1]
         believed = message if isinstance(message, LocalizationEstimate) else self._channels.localization
         assert believed is not None  # localization is the first to speak
-        occasion = Occasion(
+        return Occasion(
             message=MessageId(component, index),
             elapsed=round(truth.time - self._start, 9),
             state=state_of(self._stations[-1], truth.speed, truth.acceleration),
@@ -244,26 +232,8 @@ class Drive:
             sensor_range=self._stack.sensor_range,
             futures=self._task.futures,
             told=_objects_in(message),
-            tracks=self._tracks,
+            tracks=self._intervening.tracks,
         )
-        result: Message | None = message
-        for intervention, gate in self._interventions[component]:
-            if gate.admits(occasion):
-                result = self._replaced(intervention, result, occasion)
-        return result
-
-    def _replaced(self, intervention: Intervention, message: Message | None, occasion: Occasion) -> Message | None:
-        if not isinstance(intervention, Fault):
-            if self._substituted is None:
-                self._substituted = occasion.moment.time
-            return SUBSTITUTES[intervention.component](occasion)
-        if message is None:
-            return None
-        altered = EFFECTS[intervention.effect](message, intervention.parameters, occasion)
-        indices = self._altered[intervention.component]
-        if altered is not message and indices[-1:] != [occasion.message.index]:  # two faults may touch one message
-            indices.append(occasion.message.index)
-        return altered
 
     def _localize(self, moment: Moment) -> Message:  # noqa: ARG002 - all steps are called alike
         truth, sensors = self._path[-1], self._stack.sensors
