@@ -22,7 +22,9 @@ def is_proven(drive: FactualDrive, found: Attribution) -> bool:
         return False
     dtest = Dtest(drive.engine.witness, setting_of(drive.request, record, violation), lambda _probe: None)
     if mark.component is Component.PLANNING:
-        if first_unusable_plan(record, mark.time, mark.time) is not None:
+        before = record.mark(MessageId(mark.component, max(mark.index - 1, 0)))
+        unusable = first_unusable_plan(record, before.time, violation.time)
+        if unusable is not None and unusable.mark == mark:
             return True
         first = first_violating_plan(record, drive.engine.roadmap, record.thresholds, violation)
         return first is not None and first.mark == mark and dtest.ask(Question(SUBSTITUTABLE)) is Outcome.VIOLATES

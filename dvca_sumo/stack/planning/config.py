@@ -77,7 +77,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     pass_hold: float = 0.5  # [s] less margin is accepted by a decision already taken
     clear_margin: float = 0.5  # [s] behind someone who has crossed
     expected_reaction: float = 0.5  # [s] of those who have to give way to the ego
-    expected_braking: float = 3.0  # [m/s^2] of those who have to give way to the ego
+    expected_braking: float = 4.5  # [m/s^2] and of them, after that
     give_way_speed: float = 8.0  # [m/s] at a line where others may have priority
 
     # Signals and signs.

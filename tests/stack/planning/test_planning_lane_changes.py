@@ -3,10 +3,10 @@
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import SHAPE, Drive, assert_drivable, car, drive, road
+from planned_drives import SHAPE, Drive, assert_drivable, car, drive, road, stop_line
 
 from dvca_sumo.messages import Floats
-from dvca_sumo.roadmap import Route
+from dvca_sumo.roadmap import Control, Route
 from dvca_sumo.roadmap.route import LaneChange
 
 WIDTH = 3.2  # [m] of a lane
@@ -84,7 +84,8 @@ def test_beside_a_queue_without_a_gap_it_waits_at_the_end_of_its_lane() -> None:
 
 def test_behind_the_tail_of_a_queue_it_changes_and_stops() -> None:
     queue = [car(number, 200.0 + 6.5 * number, WIDTH, speed=10.0, stays_from=5.0) for number in range(40)]
-    driven = drive(crossing_over(), 60.0, speed=13.0, actors=queue)
+    route = msgspec.structs.replace(crossing_over(), stop_lines=(stop_line(LATEST, Control.PRIORITY),))
+    driven = drive(route, 60.0, speed=13.0, actors=queue)
     assert driven.speeds[-1] == 0.0
     assert driven.states[-1, 2] == pytest.approx(WIDTH, abs=0.2)
     assert driven.clearances.min() > 1.0
