@@ -37,9 +37,8 @@ SETTLE = 4.0  # [s]
 # ... or so long, when by then it has left the place of the factual violation behind.
 LEAST_SETTLE = 2.5  # [s]
 PAST = 10.0  # [m]
-_USABLE = (
-    1.0  # [s] before the last chance of who is named, up to the violation, there must be plans that one can follow
-)
+# From so long before the last chance of who is named, up to the violation, plans must be such that one can follow.
+_USABLE = 1.0  # [s]
 _FURTHER = 60.0  # [s] the factual run goes on for past its first violation, to show what else happens
 _HORIZON = float(PREDICTION_TIMES[-1])  # [s] the factual run goes on for, so that its last futures are whole
 

@@ -13,14 +13,8 @@ from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
 
 _SEARCHED = 10.0  # [m] along the route: no ego gets farther in a world step, and a route may come by again soon
 _INDICATED = 50.0  # [m] before a junction an ego that turns at it begins to indicate
-_SIDES = {
-    "l": 1,
-    "L": 1,
-    "t": 1,
-    "r": -1,
-    "R": -1,
-    "T": -1,
-}  # of a movement's direction; T: about, in left-hand traffic
+# By a movement's direction; T: about, in left-hand traffic.
+_SIDES = {"l": 1, "L": 1, "t": 1, "r": -1, "R": -1, "T": -1}
 
 
 def shape_of(entry: Entry) -> VehicleShape:
