@@ -23,6 +23,7 @@ from dvca_sumo.scenario import Scenario, ScenarioError, silenced
 from dvca_sumo.truth import EgoTruth, ObjectsTruth
 from dvca_sumo.world.crowd import Body, Crowd
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
+from dvca_sumo.world.signals import Signals
 
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
 NEVER_TELEPORTED = "dvca.ego"  # vehicle type of an adopted ego
@@ -30,17 +31,6 @@ NEVER_TELEPORTED = "dvca.ego"  # vehicle type of an adopted ego
 _VEHICLE = (tc.VAR_POSITION, tc.VAR_ANGLE, tc.VAR_SPEED, tc.VAR_LANE_ID)
 # Other variables than for vehicles: results of both kinds arrive in one dictionary, by id.
 _PERSON = (tc.VAR_POSITION3D, tc.VAR_ANGLE, tc.VAR_SPEED, tc.VAR_VEHICLE)
-_COLOURS = {
-    "r": SignalColour.RED,
-    "u": SignalColour.RED,
-    "y": SignalColour.YELLOW,
-    "Y": SignalColour.YELLOW,
-    "G": SignalColour.GREEN,
-    "g": SignalColour.PERMISSIVE,
-    "s": SignalColour.PERMISSIVE,
-    "o": SignalColour.OFF,
-    "O": SignalColour.OFF,
-}
 _NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
 _ANY_BRAKING = 1e4  # [m/s^2] SUMO's own driver, overruled, would warn of braking for the arrival at every step
 _MATCHED_WITHIN = 30.0  # [m] of a lane an ego is on the road; SUMO looks at every lane within that
@@ -107,7 +97,7 @@ class Session:
             raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {_in_one_line(error)}") from None
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
-        self._signals: dict[tuple[str, ...], _Signals] = {}  # by the heads asked for
+        self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
 
     @property
     def time(self) -> float:
@@ -274,7 +264,7 @@ class Session:
         """Colours of signal heads, given as "traffic light/link index"; not to be written to."""
         known = self._signals.get(signal_ids)
         if known is None:
-            known = self._signals[signal_ids] = _Signals(signal_ids)
+            known = self._signals[signal_ids] = Signals(signal_ids)
         state_of = libsumo.trafficlight.getRedYellowGreenState
         return known.showing({light: state_of(light) for light in known.lights})
 
@@ -318,24 +308,6 @@ class Session:
             of = libsumo.person
             self._bodies[key] = Body(ObjectClass.PEDESTRIAN, of.getLength(name), of.getWidth(name), 0.0)
         return key
-
-
-class _Signals:
-    """Signal heads of one route; what they show is put together anew only when a light has changed."""
-
-    def __init__(self, signal_ids: tuple[str, ...]) -> None:
-        parts = [(signal, *signal.rpartition("/")[::2]) for signal in signal_ids]
-        self._heads = [(signal, light, int(link)) for signal, light, link in parts]
-        self.lights = tuple(dict.fromkeys(light for _, light, _ in self._heads))
-        self._states: dict[str, str] = {}
-        self._colours: dict[str, SignalColour] = {}
-
-    def showing(self, states: dict[str, str]) -> dict[str, SignalColour]:
-        """Colours by signal id, `states` being SUMO's by traffic light."""
-        if states != self._states:
-            self._states = states
-            self._colours = {signal: _COLOURS[states[light][link]] for signal, light, link in self._heads}
-        return self._colours
 
 
 def _is_braking(truth: EgoTruth) -> bool:
