@@ -4,17 +4,16 @@ import numpy as np
 
 from dvca_sumo.messages import VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.path import Path
-from dvca_sumo.stack.planning.reference import Window
-from dvca_sumo.stack.planning.scene import Scene
+from dvca_sumo.stack.planning.st_graph import Graph
 
 
-def blocking(scene: Scene, window: Window, path: Path, shape: VehicleShape, config: PlanningConfig) -> int | None:
+def blocking(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> int | None:
     """The first standing object ahead that leaves less than the ego's width between the bounds; its row in the scene.
 
     Whatever stands bounds the path on that side of it where it is, grown by the buffers of `config`.
     None where the ego's body finds room between the bounds all along.
     """
+    window, path, scene = graph.window, graph.path, graph.scene
     now, buffer = scene.now, config.lateral_buffer
     rows = window.index(now.stations)
     is_left = now.offsets > 0.5 * (path.left[rows] + path.right[rows])

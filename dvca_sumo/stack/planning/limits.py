@@ -6,11 +6,10 @@ import numpy as np
 
 from dvca_sumo.messages import ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Control
+from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
-from dvca_sumo.stack.planning.path import Path
-from dvca_sumo.stack.planning.reference import BEHIND, Window
-from dvca_sumo.stack.planning.scene import Scene
+from dvca_sumo.stack.planning.reference import BEHIND
 from dvca_sumo.stack.planning.speed import Leader, Stop, slowed_before
 from dvca_sumo.stack.planning.st_graph import Graph
 
@@ -25,24 +24,17 @@ _TIMID = 1.0  # [m/s] a leader slower than this, now and in `_SOON_STEP`, may st
 _SOON_STEP = 15  # of the profile: 3 s
 
 
-def speed_caps(
-    window: Window,
-    path: Path,
-    scene: Scene,
-    graph: Graph,
-    views: list[LineView],
-    shape: VehicleShape,
-    config: PlanningConfig,
-) -> list[float]:
+def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config: PlanningConfig) -> list[float]:
     """Highest speed by metre of path [m/s]: limit, curves, passing close by, lines where others may come first.
 
     Each is braked for in comfort beforehand.
     """
+    path = graph.path
     caps = np.minimum(
-        config.cruise_fraction * window.speed_limits[BEHIND:],
+        config.cruise_fraction * graph.window.speed_limits[BEHIND:],
         np.sqrt(config.lateral_acceleration / np.maximum(np.abs(path.curvatures), 1e-4)),
     )
-    for row, cap in _passing_speeds(scene, graph, config):
+    for row, cap in _passing_speeds(graph, config):
         low, high = graph.low[row, 0] - shape.front, graph.high[row, 0] + shape.rear_overhang
         if high > 0.0:
             part = slice(max(int(low), 0), int(high) + 1)
@@ -57,8 +49,6 @@ def speed_caps(
 
 def nearest_stop(
     to_destination: float,
-    blocker: int | None,
-    scene: Scene,
     graph: Graph,
     views: list[LineView],
     leader: Leader | None,
@@ -67,16 +57,15 @@ def nearest_stop(
 ) -> Stop:
     """The first place where the ego has to stop whatever others do: destination, line, object, occupied exit.
 
-    `to_destination` counts from the front bumper [m]. `blocker`: the standing object, as a row of the
-    scene, that leaves the path no room between its bounds.
+    `to_destination` counts from the front bumper [m].
     """
     stops = [Stop(to_destination, _GIVE_AT_DESTINATION, "stop destination")]
     stops += [_at_line(view.distance, view.stop, config) for view in views if view.stop]
     occupied_from = math.inf
-    obstacle = _obstacle(scene, graph, blocker, shape.front)
+    obstacle = _obstacle(graph, shape, config)
     if obstacle is not None:
         occupied_from = float(graph.low[obstacle, 0]) - shape.front
-        label = f"stop behind {scene.ids[scene.owners[obstacle]]}"
+        label = f"stop behind {graph.track(obstacle)}"
         gap = -config.object_gap if config.stops_past_objects else config.object_gap
         stops.append(Stop(occupied_from - gap, config.object_gap - _GIVE_AT_OBJECT, label))
     if leader is not None and max(leader.speeds[0], leader.speeds[_SOON_STEP]) < _TIMID:
@@ -92,19 +81,23 @@ def _at_line(distance: float, label: str, config: PlanningConfig) -> Stop:
     return Stop(distance - config.stop_line_gap, config.stop_line_gap, label)
 
 
-def _obstacle(scene: Scene, graph: Graph, blocker: int | None, front: float) -> int | None:
-    """The nearest future that stands in the way, as a row; not one that the front bumper has cleared already."""
+def _obstacle(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> int | None:
+    """The nearest future that stands in the way, as a row; not one that the front bumper has cleared already.
+
+    In the way is also what leaves the path no room between its bounds.
+    """
+    scene, blocker = graph.scene, blocking(graph, shape, config)
     still = slice(scene.moving, None)
     low = graph.low[still, 0]
-    in_way = graph.occupied[still, 0] & ((low > front) | (graph.gaps[still, 0] < 0.0))
+    in_way = graph.occupied[still, 0] & ((low > shape.front) | (graph.gaps[still, 0] < 0.0))
     if blocker is not None:
         in_way |= scene.owners[still] == blocker
     return scene.moving + int(np.where(in_way, low, np.inf).argmin()) if in_way.any() else None
 
 
-def _passing_speeds(scene: Scene, graph: Graph, config: PlanningConfig) -> list[tuple[int, float]]:
+def _passing_speeds(graph: Graph, config: PlanningConfig) -> list[tuple[int, float]]:
     """Futures that are passed close by now, as rows, and at which speed [m/s]."""
-    gaps = graph.gaps[:, 0]
+    scene, gaps = graph.scene, graph.gaps[:, 0]
     speeds = []
     for row in ((gaps >= 0.0) & (gaps < max(config.person_slow_gap, config.object_slow_gap))).nonzero()[0].tolist():
         owner, gap = scene.owners[row], float(gaps[row])

@@ -9,7 +9,7 @@ import numpy as np
 from dvca_sumo.messages import ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView, has_priority
-from dvca_sumo.stack.planning.scene import SOON, SOON_TIME, Flags, Scene
+from dvca_sumo.stack.planning.scene import SOON, SOON_TIME, Flags
 from dvca_sumo.stack.planning.speed import STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import ALONG, PRESENT, Graph
 
@@ -42,52 +42,46 @@ class Meetings:
         """End a cycle in which the ego passes in front of the tracks `passing`."""
         self._passing = frozenset(passing)
 
-    def demands(
-        self, rows: list[int], graph: Graph, scene: Scene, views: list[LineView], station: float, profile: Profile
-    ) -> list[Demand]:
-        """What the futures `rows` ask of an ego that would otherwise drive `profile`.
-
-        `station` is the window's origin on the route [m].
-        """
+    def demands(self, rows: list[int], graph: Graph, views: list[LineView], profile: Profile) -> list[Demand]:
+        """What the futures `rows` ask of an ego that would otherwise drive `profile`."""
         if not rows:
             return []
-        settled = self._comes_after(rows, graph, scene, profile)
-        settled |= self._passes(rows, graph, scene, profile, self._config.pass_margin)
+        settled = self._comes_after(rows, graph, profile)
+        settled |= self._passes(rows, graph, profile, self._config.pass_margin)
         found = (
-            self._demand(row, graph, scene, views, station, profile)
+            self._demand(row, graph, views, profile)
             for row, is_settled in zip(rows, settled.tolist(), strict=True)
             if not is_settled
         )
         return [demand for demand in found if demand is not None]
 
-    def _demand(
-        self, row: int, graph: Graph, scene: Scene, views: list[LineView], station: float, profile: Profile
-    ) -> Demand | None:
-        config, owner = self._config, int(scene.owners[row])
-        entry = float(scene.times[graph.first[row]])
-        others_first = self._others_first(row, graph, scene, views, station)
+    def _demand(self, row: int, graph: Graph, views: list[LineView], profile: Profile) -> Demand | None:
+        config = self._config
+        entry = float(graph.scene.times[graph.first[row]])
+        others_first = self._others_first(row, graph, views)
         if others_first is False:
-            if self._cuts_in(row, graph, scene):
-                return self._cut_in(row, graph, scene, profile)
-            if self._will_wait(row, entry, scene):
+            if self._cuts_in(row, graph):
+                return self._cut_in(row, graph, profile)
+            if self._will_wait(row, entry, graph):
                 return None
         margin = config.pass_margin_prior
         if others_first:
-            margin = config.pass_margin - (config.pass_hold if scene.ids[owner] in self._passing else 0.0)
-        if margin < config.pass_margin and self._passes([row], graph, scene, profile, margin)[0]:
+            margin = config.pass_margin - (config.pass_hold if graph.track(row) in self._passing else 0.0)
+        if margin < config.pass_margin and self._passes([row], graph, profile, margin)[0]:
             return None
-        stop = self._stop(row, graph, scene, views)
+        stop = self._stop(row, graph, views)
         room = stop.at + stop.give
         if room <= 0.0:  # beside the ego already, or nearly: stopping there would not help
             return None
         is_too_late = profile.speeds[0] ** 2 / (2.0 * room) > config.hard_braking
-        if is_too_late and self._passes([row], graph, scene, profile, 0.0)[0]:
+        if is_too_late and self._passes([row], graph, profile, 0.0)[0]:
             return None
-        return Demand(row, stop, follows=self._joins(row, graph, scene))
+        return Demand(row, stop, follows=self._joins(row, graph))
 
-    def _will_wait(self, row: int, entry: float, scene: Scene) -> bool:
+    def _will_wait(self, row: int, entry: float, graph: Graph) -> bool:
         """Whether who has to give way, and is on the path at `entry` [s], may still stop: unless it speeds up."""
-        config, speed = self._config, float(scene.speeds[scene.owners[row]])
+        config, scene = self._config, graph.scene
+        speed = float(scene.speeds[scene.owners[row]])
         left = entry - config.expected_reaction
         if entry <= PRESENT or speed > 2.0 * max(left, 0.0) * config.expected_braking:
             return False
@@ -98,52 +92,53 @@ class Meetings:
         )
         return way < (speed + _SPEEDS_UP) * SOON_TIME
 
-    def _passes(self, rows: list[int], graph: Graph, scene: Scene, profile: Profile, margin: float) -> Flags:
+    def _passes(self, rows: list[int], graph: Graph, profile: Profile, margin: float) -> Flags:
         """Whether the ego has left every place that a future occupies `margin` [s] before it comes there."""
-        rear = np.interp(scene.times - margin, STEP_TIMES, profile.arcs) - self._shape.rear_overhang
+        rear = np.interp(graph.scene.times - margin, STEP_TIMES, profile.arcs) - self._shape.rear_overhang
         passes: Flags = np.all((rear > graph.high[rows]) | ~graph.occupied[rows], axis=1)
         return passes
 
-    def _comes_after(self, rows: list[int], graph: Graph, scene: Scene, profile: Profile) -> Flags:
+    def _comes_after(self, rows: list[int], graph: Graph, profile: Profile) -> Flags:
         """Whether the ego comes to every place that a future occupies after that has gone."""
-        times = scene.times + self._config.clear_margin
+        times = graph.scene.times + self._config.clear_margin
         front = np.interp(times, STEP_TIMES, profile.arcs) + (self._shape.front + _CLEAR_GAP)
         after: Flags = np.all((front < graph.low[rows]) | ~graph.occupied[rows], axis=1)
         return after
 
-    def _others_first(self, row: int, graph: Graph, scene: Scene, views: list[LineView], station: float) -> bool:
+    def _others_first(self, row: int, graph: Graph, views: list[LineView]) -> bool:
         """Whether the other has priority. People have; on junctions the map tells; who leaves its lane has not."""
+        scene = graph.scene
         if scene.classes[scene.owners[row]] == _PERSON:
             return True
-        told = has_priority(views, station + float(graph.low[row, graph.first[row]]), scene.lanes[row])
-        return told if told is not None else not self._cuts_in(row, graph, scene)
+        station = graph.window.station + float(graph.low[row, graph.first[row]])
+        told = has_priority(views, station, scene.lanes[row])
+        return told if told is not None else not self._cuts_in(row, graph)
 
-    def _cuts_in(self, row: int, graph: Graph, scene: Scene) -> bool:
-        futures, first = scene.futures, graph.first[row]
+    def _cuts_in(self, row: int, graph: Graph) -> bool:
+        futures, first = graph.scene.futures, graph.first[row]
         is_along = futures.directions[row, 0] > ALONG and futures.directions[row, first] > ALONG
         return bool(is_along and abs(futures.offsets[row, first] - futures.offsets[row, 0]) > _CUTS_IN)
 
-    def _cut_in(self, row: int, graph: Graph, scene: Scene, profile: Profile) -> Demand | None:
+    def _cut_in(self, row: int, graph: Graph, profile: Profile) -> Demand | None:
         """Who cuts in with its nose ahead of ours becomes the leader; who does not has to see to it."""
         first = graph.first[row]
-        front = float(np.interp(scene.times[first], STEP_TIMES, profile.arcs)) + self._shape.front
+        front = float(np.interp(graph.scene.times[first], STEP_TIMES, profile.arcs)) + self._shape.front
         if graph.high[row, first] < front:
             return None
-        label = f"follow {scene.ids[scene.owners[row]]}"
+        label = f"follow {graph.track(row)}"
         return Demand(row, Stop(float(graph.low[row, first]), 0.0, label, until=0.0), follows=True)
 
-    def _joins(self, row: int, graph: Graph, scene: Scene) -> bool:
+    def _joins(self, row: int, graph: Graph) -> bool:
         """Whether the other drives along the path once it is on it."""
         first, last = graph.first[row], graph.last[row]
-        return bool(scene.futures.directions[row, last] > ALONG and last > first + _STAYS)
+        return bool(graph.scene.futures.directions[row, last] > ALONG and last > first + _STAYS)
 
-    def _stop(self, row: int, graph: Graph, scene: Scene, views: list[LineView]) -> Stop:
+    def _stop(self, row: int, graph: Graph, views: list[LineView]) -> Stop:
         """Before the other's way until it is clear; at the stop line while the ego has not crossed it."""
         config, front = self._config, self._shape.front
-        first, last = graph.first[row], graph.last[row]
-        owner = scene.owners[row]
-        gap = config.person_gap if scene.classes[owner] == _PERSON else config.yield_gap
-        if self._joins(row, graph, scene):
+        first, last, scene = graph.first[row], graph.last[row], graph.scene
+        gap = config.person_gap if scene.classes[scene.owners[row]] == _PERSON else config.yield_gap
+        if self._joins(row, graph):
             nearest, until = float(graph.low[row, first]), float(scene.times[first])
         else:
             nearest = float(graph.low[row][graph.occupied[row]].min())
@@ -155,4 +150,4 @@ class Meetings:
             is_within = distance - 1.0 <= nearest - front <= distance + line.exit_station - line.station
             if is_within and distance > -_AT_LINE:
                 at = min(at, distance - config.stop_line_gap)
-        return Stop(at, max(nearest - _HARD_GAP - front - at, 0.0), f"yield {scene.ids[owner]}", until)
+        return Stop(at, max(nearest - _HARD_GAP - front - at, 0.0), f"yield {graph.track(row)}", until)

@@ -14,7 +14,6 @@ from dvca_sumo.messages import (
     VehicleShape,
 )
 from dvca_sumo.roadmap.route import Route
-from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.destination import stop_station
 from dvca_sumo.stack.planning.junctions import Junctions, LineView
@@ -23,8 +22,8 @@ from dvca_sumo.stack.planning.limits import nearest_stop, speed_caps
 from dvca_sumo.stack.planning.meeting import Demand, Meetings
 from dvca_sumo.stack.planning.nudging import Nudge, NudgeDecider, Situation
 from dvca_sumo.stack.planning.path import Path, lateral_start, path_along
-from dvca_sumo.stack.planning.reference import BEHIND, Reference, Window
-from dvca_sumo.stack.planning.scene import Scene, scene_in
+from dvca_sumo.stack.planning.reference import BEHIND, Reference
+from dvca_sumo.stack.planning.scene import scene_in
 from dvca_sumo.stack.planning.speed import Profile, Stop, roll_out
 from dvca_sumo.stack.planning.st_graph import Graph, graph_of, leader_of, leading
 from dvca_sumo.stack.planning.start import StartState, start_state
@@ -114,7 +113,7 @@ class Planner:
         nudges = self._nudging.step(Situation(time, start.speed, lateral, window, scene, views))
         path = path_along(window, start, lateral, [nudge.plateau for nudge in nudges], shape, config)
         graph = graph_of(scene, window, path, self._route.crossings, shape, config)
-        profile = self._profile(start, window, path, scene, graph, views, choice)
+        profile = self._profile(start, graph, views, choice)
         return _points(path, profile), profile.label or _described(nudges, path)
 
     def _reach(self, station: float, speed: float) -> float:
@@ -123,28 +122,18 @@ class Planner:
         gained = 0.5 * self._config.acceleration * _HORIZON
         return _HORIZON * max(speed, min(speed + gained, fastest)) + self._shape.front + _SPARE
 
-    def _profile(
-        self,
-        start: StartState,
-        window: Window,
-        path: Path,
-        scene: Scene,
-        graph: Graph,
-        views: list[LineView],
-        choice: LaneChoice,
-    ) -> Profile:
+    def _profile(self, start: StartState, graph: Graph, views: list[LineView], choice: LaneChoice) -> Profile:
         """The fastest motion that all demands allow, found by adding demands until nobody else is in the way."""
         config, shape = self._config, self._shape
-        caps = speed_caps(window, path, scene, graph, views, shape, config)
-        if abs(math.remainder(start.heading - float(path.headings[0]), 2.0 * math.pi)) > _ASTRAY:
+        caps = speed_caps(graph, views, shape, config)
+        if abs(math.remainder(start.heading - float(graph.path.headings[0]), 2.0 * math.pi)) > _ASTRAY:
             caps = [min(cap, config.astray_speed) for cap in caps]
-        leaders, others = leading(graph, scene, shape, config)
+        leaders, others = leading(graph, shape, config)
         if choice.behind:
-            others = [row for row in others if scene.ids[scene.owners[row]] not in choice.behind]
-        leader = leader_of(leaders, graph, scene, shape)
-        to_destination = self._destination - window.station - shape.front
-        blocker = blocking(scene, window, path, shape, config)
-        stops = [nearest_stop(to_destination, blocker, scene, graph, views, leader, shape, config)]
+            others = [row for row in others if graph.track(row) not in choice.behind]
+        leader = leader_of(leaders, graph, shape)
+        to_destination = self._destination - graph.window.station - shape.front
+        stops = [nearest_stop(to_destination, graph, views, leader, shape, config)]
         if choice.keeping is not None:
             stops.append(choice.keeping.stop)
             caps = [min(cap, choice.keeping.pace) for cap in caps]
@@ -152,29 +141,29 @@ class Planner:
         demands: dict[int, Demand] = {}
         for _ in range(_ROUNDS):
             undecided = [row for row in others if row not in demands]
-            new = self._meetings.demands(undecided, graph, scene, views, window.station, profile)
+            new = self._meetings.demands(undecided, graph, views, profile)
             if not new:
                 break
             demands.update((demand.row, demand) for demand in new)
             joining = [demand.row for demand in demands.values() if demand.follows]
-            leader = leader_of(leaders + joining, graph, scene, shape)
-            stops_now = [*stops, *_merged(demands, scene)]
+            leader = leader_of(leaders + joining, graph, shape)
+            stops_now = [*stops, *_merged(demands, graph)]
             profile = roll_out(start.speed, start.acceleration, caps, stops_now, leader, config)
-        yielding = {int(scene.owners[row]) for row in demands}
-        self._meetings.settle(scene.ids[scene.owners[row]] for row in others if scene.owners[row] not in yielding)
+        yielding = {graph.track(row) for row in demands}
+        self._meetings.settle({graph.track(row) for row in others} - yielding)
         return profile
 
 
-def _merged(demands: dict[int, Demand], scene: Scene) -> list[Stop]:
+def _merged(demands: dict[int, Demand], graph: Graph) -> list[Stop]:
     """One stop for each object: the nearest place of all its futures, until the last of them has passed."""
     stops: dict[int, Stop] = {}
     for row, demand in demands.items():
-        owner, stop = int(scene.owners[row]), demand.stop
-        if owner in stops:
-            known = stops[owner]
+        track, stop = graph.track(row), demand.stop
+        if track in stops:
+            known = stops[track]
             nearer = min(known, stop, key=lambda each: each.at)
             stop = Stop(nearer.at, nearer.give, stop.label, max(known.until, stop.until))
-        stops[owner] = stop
+        stops[track] = stop
     return [stop for stop in stops.values() if stop.until > 0.0]
 
 

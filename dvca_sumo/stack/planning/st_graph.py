@@ -23,14 +23,22 @@ _AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
 
 
 class Graph(msgspec.Struct, frozen=True, eq=False):
-    """Occupation of the path by each future of the scene; places are arcs of the path [m]."""
+    """Occupation of `path` by each future of `scene`; places are arcs of the path [m]."""
 
+    window: Window
+    path: Path
+    scene: Scene
     occupied: Flags  # (h, t)
     gaps: Floats  # (h, t) [m] sideways between body and object, negative where they would overlap
     low: Floats  # (h, t) [m] the object's near end along the path
     high: Floats  # (h, t) [m] its far end
     first: list[int]  # (h,) column in which occupation begins; 0 where there is none
     last: list[int]  # (h,) column in which it ends
+
+    def track(self, row: int) -> int:
+        """Id of the object whose future row `row` is."""
+        track: int = self.scene.ids[self.scene.owners[row]]
+        return track
 
 
 def graph_of(
@@ -59,7 +67,7 @@ def graph_of(
     if config.trusts_lane_room:
         occupied[scene.moving :][_has_lane_room(scene, window, shape)] = False
     last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)
-    return Graph(occupied, gaps, low, high, occupied.argmax(axis=1).tolist(), last.tolist())
+    return Graph(window, path, scene, occupied, gaps, low, high, occupied.argmax(axis=1).tolist(), last.tolist())
 
 
 def _has_lane_room(scene: Scene, window: Window, shape: VehicleShape) -> Flags:
@@ -98,11 +106,12 @@ def _margins(scene: Scene, window: Window, crossings: tuple[Crossing, ...], conf
     return margins
 
 
-def leading(graph: Graph, scene: Scene, shape: VehicleShape, config: PlanningConfig) -> tuple[list[int], list[int]]:
+def leading(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> tuple[list[int], list[int]]:
     """Moving futures on the path, as rows of the graph: those that lead (or come towards) the ego, and the rest.
 
     Left out are unlikely ones that are not about to happen, and who drives behind the ego.
     """
+    scene = graph.scene
     rows = np.flatnonzero(graph.occupied[: scene.moving].any(axis=1))
     if not rows.size:
         return [], []
@@ -125,11 +134,11 @@ def leading(graph: Graph, scene: Scene, shape: VehicleShape, config: PlanningCon
     return leaders, others
 
 
-def leader_of(rows: list[int], graph: Graph, scene: Scene, shape: VehicleShape) -> Leader | None:
+def leader_of(rows: list[int], graph: Graph, shape: VehicleShape) -> Leader | None:
     """The nearest of the futures `rows` at each moment, while they occupy the path; carried on at constant speed."""
     if not rows:
         return None
-    low = graph.low[rows]
+    scene, low = graph.scene, graph.low[rows]
     places = np.where(graph.occupied[rows], low - shape.front, _NEVER)
     nearest = places.argmin(axis=0)
     count = len(nearest)
@@ -141,7 +150,7 @@ def leader_of(rows: list[int], graph: Graph, scene: Scene, shape: VehicleShape) 
     times[:-1], times[-1] = scene.times, STEP_TIMES[-1]
     speeds[-1] = speeds[-2]
     rears[-1] = rears[-2] + (times[-1] - times[-2]) * speeds[-1]
-    track = scene.ids[scene.owners[rows[nearest[(rears < _NEVER).argmax()]]]]
+    track = graph.track(rows[nearest[(rears < _NEVER).argmax()]])
     return Leader(
         np.interp(STEP_TIMES, times, rears).tolist(), np.interp(STEP_TIMES, times, speeds).tolist(), f"follow {track}"
     )
