@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from small_scenarios import EGO, in_child, scenario_file
-from watched_world import STANDING, asked, entered, objects_of, watch, watched
+from watched_world import STANDING, STEP, asked, entered, objects_of, watch, watched
 
 from dvca_sumo.engine.replay import roadmap
 from dvca_sumo.messages import ObjectClass, SignalColour
@@ -74,6 +75,19 @@ def test_vehicles_of_all_sizes_are_boxes_around_their_centre(tmp_path: Path, str
     assert (truth.lanes[bus], truth.lanes[bike]) == ("cb_1", "bc_0")
     bus_x, bus_y = asked(config, 3, lambda sumo: sumo.vehicle.getPosition("bus"))
     assert truth.boxes[bus, :2].tolist() == pytest.approx([bus_x + 6.0, bus_y])
+
+
+def test_a_body_is_as_fast_as_it_is_moved(tmp_path: Path, plain_file: Callable[..., Path]) -> None:
+    nodes = '<node id="b" x="200" y="0"/><node id="c" x="500" y="0"/>'
+    there = '<edge id="bc" from="b" to="c" numLanes="2" speed="13.9"/>'
+    back = '<edge id="cb" from="c" to="b" numLanes="2" speed="13.9" length="200"/>'  # drawn half as long again
+    driver = '<vehicle id="other" depart="0" departPos="130" departSpeed="10"><route edges="cb"/></vehicle>'
+    moments = watched(scenario_file(tmp_path, plain_file(nodes, there + back), STANDING + driver), 20)
+    rows = [objects_of(moment)["other"] for moment in moments]
+    places = [moment.objects.boxes[row, 0] for moment, row in zip(moments, rows, strict=True)]
+    speeds = [moment.objects.velocities[row, 0] for moment, row in zip(moments, rows, strict=True)]
+    assert speeds[1:] == pytest.approx((np.diff(places) / STEP).tolist())
+    assert speeds[1] < -14.0
 
 
 def test_a_parked_car_is_seen_beside_the_road(tmp_path: Path, street: Path) -> None:
