@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dvca_sumo.record import Record
 from dvca_sumo.run.departing import Departing, RoadMapOf, free_flow
-from dvca_sumo.run.drive import Drive, Judging, Outcome
+from dvca_sumo.run.drive import Drive, DriveResult, Judging
 from dvca_sumo.run.simulation import Over, Simulation
 from dvca_sumo.run.task import StopRule, Task
 from dvca_sumo.scenario import Scenario
@@ -17,8 +17,8 @@ from dvca_sumo.world import World
 __all__ = [
     "Departing",
     "Drive",
+    "DriveResult",
     "Judging",
-    "Outcome",
     "Over",
     "RoadMapOf",
     "Simulation",

@@ -58,7 +58,7 @@ class Judging(NamedTuple):
     places: Places  # that the oracles share
 
 
-class Outcome(msgspec.Struct, frozen=True):
+class DriveResult(msgspec.Struct, frozen=True):
     """How a drive came out."""
 
     violations: tuple[Violation, ...]  # by time, up to the first contact
@@ -157,7 +157,7 @@ class Drive:
         self._digests.append(self._digest.step(fresh, self._path[-TICKS_PER_STEP:], moment.objects))
         return True
 
-    def outcome(self) -> Outcome:
+    def outcome(self) -> DriveResult:
         """How the drive came out that is over, or is cut here."""
         ending = self._ending or Ending.CUT
         is_judged = math.isinf(self._contact)  # after a contact nothing was judged
@@ -166,7 +166,7 @@ class Drive:
         self._violations.extend(one for judged in judgements for one in judged.violations if id(one) not in known)
         violations = sorted(self._violations, key=lambda violation: violation.time)
         digest = Digest().step(self._digests, violations).hex()
-        return Outcome(tuple(violations), judgements, ending, digest)
+        return DriveResult(tuple(violations), judgements, ending, digest)
 
     def record(self, simulated: float) -> Record:
         """What the whole drive left, `simulated` [s] of SUMO time having passed."""

@@ -14,7 +14,7 @@ from dvca_sumo.roadmap import RoadMap, RouteError
 from dvca_sumo.run import Departing, opened
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.screen.driving import Driven, Heard
-from dvca_sumo.screen.results import Outcome, TripResult, Watch
+from dvca_sumo.screen.results import TripOutcome, TripResult, Watch
 from dvca_sumo.screen.trips import Trip
 from dvca_sumo.stack.reference import reference_stack
 from dvca_sumo.truth import Moment
@@ -48,7 +48,7 @@ def anchored(scenario: Scenario, trips: Sequence[Trip], hear: Heard) -> Driven:
                     try:
                         rides.append(_Ride(world, departing, entry, roads))
                     except RouteError as error:  # not with the draw's: its departure is the same
-                        results.append(TripResult(name, Outcome.NOT_DRIVEN, str(error)))
+                        results.append(TripResult(name, TripOutcome.NOT_DRIVEN, str(error)))
             for ride in list(rides):
                 result = ride.step(world, is_gone=ride.native.name in arrived)
                 if result is not None:
@@ -56,7 +56,7 @@ def anchored(scenario: Scenario, trips: Sequence[Trip], hear: Heard) -> Driven:
                     results.append(result)
             hear(world.time, len(results))
         results += [ride.cut() for ride in rides]
-    results += [TripResult(name, Outcome.NOT_DRIVEN, "it did not depart") for name in sorted(awaited)]
+    results += [TripResult(name, TripOutcome.NOT_DRIVEN, "it did not depart") for name in sorted(awaited)]
     return Driven(tuple(results))
 
 
@@ -79,25 +79,25 @@ class _Ride:
     def step(self, world: World, *, is_gone: bool) -> TripResult | None:
         """Look at it at this world step; its result when it is over."""
         if is_gone:
-            return self._result(Outcome.ARRIVED)
+            return self._result(TripOutcome.ARRIVED)
         if not world.follow(self.native):
-            return self._result(Outcome.ABORTED, f"SUMO teleported it or changed its route at {world.time:g} s")
+            return self._result(TripOutcome.ABORTED, f"SUMO teleported it or changed its route at {world.time:g} s")
         moment = world.observe(self.native)
         self._watch.see(moment)
         if self._is_judged and self._has_touched(moment):
             self._is_judged = False
             self._watch.touch(moment)
-        return self._result(Outcome.TIME_OVER) if moment.time >= self._latest else None
+        return self._result(TripOutcome.TIME_OVER) if moment.time >= self._latest else None
 
     def cut(self) -> TripResult:
         """Its result, when the simulation ends before it."""
-        return self._result(Outcome.TIME_OVER)
+        return self._result(TripOutcome.TIME_OVER)
 
     def _has_touched(self, moment: Moment) -> bool:
         found = [oracle.observe(moment) for oracle in self._oracles]
         return any(one is not None and one.contact is not None for one in found)
 
-    def _result(self, outcome: Outcome, reason: str = "") -> TripResult:
-        endings = {Outcome.ARRIVED: Ending.ARRIVED, Outcome.TIME_OVER: Ending.TIME_OVER}
+    def _result(self, outcome: TripOutcome, reason: str = "") -> TripResult:
+        endings = {TripOutcome.ARRIVED: Ending.ARRIVED, TripOutcome.TIME_OVER: Ending.TIME_OVER}
         ending = endings.get(outcome, Ending.CUT) if self._is_judged else Ending.CUT
         return self._watch.result(outcome, tuple(oracle.conclude(ending) for oracle in self._oracles), reason)

@@ -8,7 +8,7 @@ import msgspec
 from dvca_sumo.engine.replay import roadmap
 from dvca_sumo.run import Departing, Drive, Over, Simulation, Task, built_here, opened
 from dvca_sumo.scenario import Scenario, ScenarioError
-from dvca_sumo.screen.results import Outcome, TripResult, Watch
+from dvca_sumo.screen.results import TripOutcome, TripResult, Watch
 from dvca_sumo.screen.trips import Trip
 from dvca_sumo.stack.reference import StackError
 from dvca_sumo.stack.sources import StackSource, stack_factory
@@ -99,7 +99,7 @@ class _Fleet:
             try:
                 drive = self._departing.drive(entry, task, self._world, is_whole=False)
             except (ScenarioError, StackError) as error:
-                self._results.append(TripResult(name, Outcome.NOT_DRIVEN, str(error)))
+                self._results.append(TripResult(name, TripOutcome.NOT_DRIVEN, str(error)))
                 continue
             self._simulation.drives.append(drive)
             net, vehicle_class = self._scenario.configuration.net, entry.vehicle_class
@@ -112,16 +112,16 @@ class _Fleet:
             if time > trip.departs + LONGEST_DELAY or (end is not None and time >= end) or self._world.is_exhausted:
                 del self._awaited[name]
                 reason = f"it did not depart until {time:g} s; in the plain traffic it departs at {trip.departs:g} s"
-                self._results.append(TripResult(name, Outcome.NOT_DRIVEN, reason))
+                self._results.append(TripResult(name, TripOutcome.NOT_DRIVEN, reason))
 
     def _finish(self, over: Sequence[Over]) -> None:
         for drive, error in over:
             outcome = drive.outcome()
             watch = self._watches.pop(drive.ego.name)
-            how = Outcome.CONTACT
+            how = TripOutcome.CONTACT
             if error is not None:
-                how = Outcome.ABORTED
+                how = TripOutcome.ABORTED
             elif outcome.ending is not Ending.CUT:
-                how = Outcome(outcome.ending.value)
+                how = TripOutcome(outcome.ending.value)
             reason = "" if error is None else str(error)
             self._results.append(watch.result(how, outcome.judgements, reason, outcome.digest))

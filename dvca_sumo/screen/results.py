@@ -13,7 +13,7 @@ from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Judgement
 
 
-class Outcome(enum.StrEnum):
+class TripOutcome(enum.StrEnum):
     """How a trip came out."""
 
     ARRIVED = "arrived"
@@ -27,7 +27,7 @@ class TripResult(msgspec.Struct, frozen=True):
     """One trip in short."""
 
     ego: str
-    outcome: Outcome
+    outcome: TripOutcome
     reason: str = ""  # of ABORTED and NOT_DRIVEN
     start: float = 0.0  # [s] of its departure
     distance: float = 0.0  # [m]
@@ -60,7 +60,7 @@ class Watch:
         self._contact = moment
 
     def result(
-        self, outcome: Outcome, judgements: tuple[Judgement, ...], reason: str = "", digest: str = ""
+        self, outcome: TripOutcome, judgements: tuple[Judgement, ...], reason: str = "", digest: str = ""
     ) -> TripResult:
         """The trip, when it is over."""
         measures, last = self._measures, self._measures.last

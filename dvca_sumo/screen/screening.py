@@ -14,7 +14,7 @@ from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.screen.anchor import anchored
 from dvca_sumo.screen.driving import Driven, Heard, driven, planned
 from dvca_sumo.screen.judging import Fault, Judged
-from dvca_sumo.screen.results import Outcome, TripResult
+from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.trips import Draw, Trip, drawn
 from dvca_sumo.stack.sources import StackSource, stack_factory
 from dvca_sumo.store import Store, key_of
@@ -134,7 +134,7 @@ class _Work:
                 elif len(batch) > 1:
                     again += [[trip] for trip in batch]
                 else:
-                    results[batch[0].ego] = TripResult(batch[0].ego, Outcome.NOT_DRIVEN, answer.reason)
+                    results[batch[0].ego] = TripResult(batch[0].ego, TripOutcome.NOT_DRIVEN, answer.reason)
             batches = again + planned(crowded_out, self._setting.concurrent)
             if batches:
                 self._progress.stage("trips that found no place beside the others", len(batches))
@@ -200,7 +200,7 @@ def _key(setting: Setting, *question: object) -> str:
 
 def excused(result: TripResult, native: TripResult) -> TripResult:
     """The result, its destination excused where SUMO's driver was held up as long."""
-    if result.outcome is not Outcome.TIME_OVER or native.duration <= result.duration:
+    if result.outcome is not TripOutcome.TIME_OVER or native.duration <= result.duration:
         return result
     reason = f"SUMO's driver had not arrived after {result.duration:.0f} s either"
     violations = tuple(

@@ -12,7 +12,7 @@ import msgspec
 from dvca_sumo.intervals import Rate, Share, rate_of, share_of
 from dvca_sumo.oracles import ORACLES
 from dvca_sumo.screen.judging import Fault
-from dvca_sumo.screen.results import Outcome, TripResult
+from dvca_sumo.screen.results import TripOutcome, TripResult
 
 NEAR = (1, 2, 3)  # [s] of time to collision
 
@@ -62,21 +62,21 @@ class DriverSummary(msgspec.Struct, frozen=True):
 
 def summary_of(results: Sequence[TripResult], like: Sequence[TripResult]) -> DriverSummary:
     """Sum up one driver's trips; travel times are relative to those of `like`."""
-    trips = [result for result in results if result.outcome is not Outcome.NOT_DRIVEN]
+    trips = [result for result in results if result.outcome is not TripOutcome.NOT_DRIVEN]
     km = sum(trip.distance for trip in trips) / 1000.0
     faults = Counter(one.fault for trip in trips for one in trip.violations)
     own = faults[Fault.DRIVER]
-    reference = {trip.ego: trip.duration for trip in like if trip.outcome is Outcome.ARRIVED}
+    reference = {trip.ego: trip.duration for trip in like if trip.outcome is TripOutcome.ARRIVED}
     ratios = [
         trip.duration / reference[trip.ego]
         for trip in trips
-        if trip.outcome is Outcome.ARRIVED and reference.get(trip.ego, 0.0) > 0.0
+        if trip.outcome is TripOutcome.ARRIVED and reference.get(trip.ego, 0.0) > 0.0
     ]
     nearest = [trip.least_ttc for trip in trips if trip.least_ttc is not None]
     return DriverSummary(
         trips=len(trips),
         not_driven=len(results) - len(trips),
-        completed=share_of(sum(trip.outcome is Outcome.ARRIVED for trip in trips), len(trips)),
+        completed=share_of(sum(trip.outcome is TripOutcome.ARRIVED for trip in trips), len(trips)),
         km=km,
         hours=sum(trip.duration for trip in trips) / 3600.0,
         outcomes=dict(Counter(trip.outcome.value for trip in results)),

@@ -8,7 +8,7 @@ import msgspec
 from dvca_sumo.intervals import Rate, Share
 from dvca_sumo.report.result import Json, versions, violation_json
 from dvca_sumo.screen.judging import Judged
-from dvca_sumo.screen.results import Outcome, TripResult
+from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.screening import Screening, Setting
 from dvca_sumo.screen.summary import DriverSummary, Quartiles, summary_of
 
@@ -56,7 +56,7 @@ def has_failed(screening: Screening) -> bool:
 
 def has_gaps(screening: Screening) -> bool:
     """Whether a trip could not be driven."""
-    return any(trip.outcome in (Outcome.NOT_DRIVEN, Outcome.ABORTED) for trip in screening.ads)
+    return any(trip.outcome in (TripOutcome.NOT_DRIVEN, TripOutcome.ABORTED) for trip in screening.ads)
 
 
 def terminal_text(screening: Screening) -> str:

@@ -11,7 +11,7 @@ from screen_scenes import traffic
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.screen.driving import Driven
 from dvca_sumo.screen.judging import Fault, Judged
-from dvca_sumo.screen.results import Outcome, TripResult
+from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.screening import Progress, Screening, Setting, Stores, excused, screened
 from dvca_sumo.screen.summary import summary_of
 from dvca_sumo.screen.tables import has_failed, has_gaps, json_of, terminal_text
@@ -139,11 +139,11 @@ def test_a_destination_is_excused_only_where_sumos_driver_was_held_up_as_long(re
     )
     late = TripResult(
         "ego",
-        Outcome.TIME_OVER,
+        TripOutcome.TIME_OVER,
         duration=100.0,
         violations=(Judged("destination", destination, Fault.DRIVER, ""),),
     )
     for taken, fault in ((99.0, Fault.DRIVER), (101.0, Fault.OTHER)):
-        native = TripResult("ego", Outcome.ARRIVED, duration=taken)
+        native = TripResult("ego", TripOutcome.ARRIVED, duration=taken)
         assert [one.fault for one in excused(late, native).violations] == [fault]
     assert all(result == excused(result, result) for result in reckless.ads)
