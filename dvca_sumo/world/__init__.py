@@ -127,7 +127,8 @@ class World:
             ScenarioError: SUMO gave up.
         """
         for ego in self._egos:
-            self._session.place(ego.name, ego.truth, ego.shape.front, ego.lane(), ego.turn())
+            lane = ego.lane()
+            self._session.place(ego.name, ego.truth, ego.shape.front, lane, ego.indicated(lane))
         self._session.step()
         lost = tuple(ego for ego in self._egos if not self._session.has(ego.name))
         for ego in lost:

@@ -67,9 +67,15 @@ class Ego:
         _, offsets = line.project([nose], between=(front - reach, front + reach))
         return change.lanes[change.nearest(front, float(offsets[0]))]
 
-    def turn(self) -> int:
-        """Which way it turns at the junction it is on or comes to next: 1 left, -1 right, 0 neither."""
+    def indicated(self, lane: str) -> int:
+        """Which way it indicates, on `lane`: 1 left, -1 right, 0 neither.
+
+        To the lane that the route needs, while that is another; else as it turns at the junction it is on or comes to.
+        """
         front = self.station() + self.shape.front
+        change = self.route.lane_change_at(front)
+        if change is not None and lane != change.lanes[-1]:
+            return 1 if change.offsets[-1, 0] > change.offsets[0, 0] else -1
         return next((side for begin, end, side in self._turns if begin <= front <= end), 0)
 
 
@@ -114,7 +120,7 @@ def _row(route: Route, station: float) -> int:
 
 
 def _turns(route: Route) -> tuple[tuple[float, float, int], ...]:
-    """Where along the route a turn is indicated, from and to [m], and its side as in `Ego.turn`."""
+    """Where along the route a turn is indicated, from and to [m], and its side as in `Ego.indicated`."""
     return tuple(
         (line.station - _INDICATED, line.exit_station, _SIDES[line.direction])
         for line in route.stop_lines

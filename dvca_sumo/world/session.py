@@ -219,7 +219,7 @@ class Session:
             of.unsubscribeContext(vehicle, kind, 0.0)  # else SUMO gives up at the next step
         of.remove(vehicle)
 
-    def place(self, ego: str, truth: EgoTruth, front: float, lane: str, turn: int) -> None:
+    def place(self, ego: str, truth: EgoTruth, front: float, lane: str, indicated: int) -> None:
         """Put the ego where its own dynamics say; effective with the next step.
 
         Args:
@@ -227,7 +227,7 @@ class Session:
             truth: How it moves now.
             front: From its rear axle to its front bumper [m].
             lane: Of the route, that it is on: without it SUMO may pick a crossing junction lane.
-            turn: Which way it indicates: 1 left, -1 right, 0 not at all.
+            indicated: Which way it indicates: 1 left, -1 right, 0 not at all.
         """
         edge, _, index = lane.rpartition("_")
         x = truth.x + front * math.cos(truth.heading)
@@ -237,7 +237,7 @@ class Session:
         # SUMO derives a wrong speed on junction and opposite lanes; drivers behind must react to the true one.
         libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
         # SUMO's own would tell what its driver, overruled, meant to do.
-        libsumo.vehicle.setSignals(ego, _INDICATORS[turn] | (_BRAKE_LIGHT if _is_braking(truth) else 0))
+        libsumo.vehicle.setSignals(ego, _INDICATORS[indicated] | (_BRAKE_LIGHT if _is_braking(truth) else 0))
 
     def objects(self, ego: str) -> ObjectsTruth:
         """Every moving body near a watched vehicle: vehicles (parked ones too), people on foot."""

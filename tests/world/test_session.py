@@ -270,10 +270,9 @@ def test_drivers_see_the_egos_true_lane_and_speed(tmp_path: Path, street: Path, 
     assert {round(speed, 9) for _, speed, _ in seen} == {8.0}
 
 
-def test_the_ego_shows_when_it_brakes_and_where_it_turns(tmp_path: Path, street: Path) -> None:
-    ego = STANDING.replace('from="bc" to="bc"', 'from="sb" to="ba"').replace('"0" departLane', '"9" departLane')
-    stop = "<trip" + ego.partition("<trip")[2].replace("/>", ' arrivalPos="60"/>')
-    scenario = load_scenario(scenario_file(tmp_path, street, stop, tls__all_off="true"))
+def shown(config: Path, street: Path) -> list[tuple[float, float, str, int]]:
+    """Speed [m/s], acceleration [m/s^2], lane and signals of the ego that its stack drives, after every step."""
+    scenario = load_scenario(config)
 
     def job() -> list[tuple[float, float, str, int]]:
         import libsumo  # noqa: PLC0415
@@ -293,7 +292,13 @@ def test_the_ego_shows_when_it_brakes_and_where_it_turns(tmp_path: Path, street:
             simulation.proceed()
         return seen
 
-    seen = in_child(job)[1:]
+    return in_child(job)[1:]
+
+
+def test_the_ego_shows_when_it_brakes_and_where_it_turns(tmp_path: Path, street: Path) -> None:
+    ego = STANDING.replace('from="bc" to="bc"', 'from="sb" to="ba"').replace('"0" departLane', '"9" departLane')
+    stop = "<trip" + ego.partition("<trip")[2].replace("/>", ' arrivalPos="60"/>')
+    seen = shown(scenario_file(tmp_path, street, stop, tls__all_off="true"), street)
     brakes = [signals & 8 > 0 for *_, signals in seen]
     assert all(
         is_lit == (speed < 0.1 or acceleration < -(0.05 + 0.005 * speed) * speed)
@@ -303,6 +308,14 @@ def test_the_ego_shows_when_it_brakes_and_where_it_turns(tmp_path: Path, street:
     indicated = [(lane, signals & 3) for *_, lane, signals in seen]
     assert [side for side, _ in itertools.groupby(side for _, side in indicated)] == [0, 2, 0]
     assert {lane for lane, side in indicated if side} == {"sb_0", ":b_11_0", ":b_22_0"}
+
+
+def test_the_ego_shows_that_it_changes_lanes(tmp_path: Path, street: Path) -> None:
+    ego = '<trip id="ego" from="ab" to="bn" depart="0" departPos="20" departSpeed="8" departLane="0" arrivalPos="40"/>'
+    seen = shown(scenario_file(tmp_path, street, ego, tls__all_off="true"), street)
+    assert {lane for *_, lane, signals in seen if not signals & 3} >= {"ab_1"}
+    sides = [side for side, _ in itertools.groupby(signals & 3 for *_, signals in seen)]
+    assert sides == [0, 2, 0, 2, 0]  # a change of lanes, then the turn
 
 
 def test_vehicles_that_collide_with_the_ego_are_not_removed(tmp_path: Path, street: Path) -> None:
