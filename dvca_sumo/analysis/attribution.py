@@ -245,6 +245,8 @@ def _decided(found: Attribution, dtest: Dtest, engine: Engine, *, is_exact: bool
     component, messages = decisive(dtest, record, answer, violation.time, found.until, is_exact=is_exact)
     if is_by_luck(dtest, record, component, messages, violation.time):
         answer = concluded(Outcome.VIOLATES, answer.singles, answer.since)
+        reason = f"ideal {component} prevents it by luck: the violation stays with all four ideal from further back"
+        answer = replace(answer, reason=reason)
         return _planning_message(
             replace(found, verdict=answer.verdict, reason=answer.reason, components=answer), engine
         )

@@ -69,12 +69,24 @@ def first_violating_plan(
 
 
 def first_unusable_plan(record: Record, since: float, until: float) -> PlanningFinding | None:
-    """The first planning message between two times [s] that nobody can follow: none, or one that begins elsewhere."""
-    for index, execution in enumerate(record.executions[Component.PLANNING]):
-        mark = record.mark(MessageId(Component.PLANNING, index))
-        if since <= mark.time <= until and (reason := _unusable(record, execution)):
-            return PlanningFinding(mark, reason)
+    """The first planning message of a row that nobody can follow: none, or one that begins elsewhere.
+
+    Of the first row that reaches in between two times [s]; it may have begun before.
+    """
+    for index in range(record.first_at(Component.PLANNING, since), len(record.executions[Component.PLANNING])):
+        found = _unusable_at(record, index)
+        if found is not None:
+            if found.mark.time > until:
+                return None
+            while found.mark.index > 0 and (before := _unusable_at(record, found.mark.index - 1)) is not None:
+                found = before
+            return found
     return None
+
+
+def _unusable_at(record: Record, index: int) -> PlanningFinding | None:
+    reason = _unusable(record, record.executions[Component.PLANNING][index])
+    return PlanningFinding(record.mark(MessageId(Component.PLANNING, index)), reason) if reason else None
 
 
 def _unusable(record: Record, execution: Execution) -> str:

@@ -195,6 +195,19 @@ def test_a_plan_that_nobody_can_follow_is_found_in_its_time_alone() -> None:
     assert first_unusable_plan(record, START, START + 1.95) is None
 
 
+def test_of_several_plans_in_a_row_that_nobody_can_follow_the_first_is_named() -> None:
+    record = drive([WALL], plan=stopping)
+    for index in (18, 19, 20, 30):
+        record = saying(record, MessageId(PLANNING, index), None)
+    for since, until in ((1.5, 2.5), (1.95, 2.5), (2.0, 4.0)):
+        found = first_unusable_plan(record, START + since, START + until)
+        assert found is not None
+        assert found.mark.index == 18
+    later = first_unusable_plan(record, START + 2.1, START + 4.0)
+    assert later is not None
+    assert later.mark.index == 30
+
+
 def test_a_plan_that_begins_beside_the_ego_cannot_be_followed_and_one_into_a_wall_can() -> None:
     beside_it = first_unusable_plan(drive([WALL], plan=beside(1.5)), START, START + 1.0)
     assert beside_it is not None
