@@ -28,7 +28,15 @@ from dvca_sumo.engine.descriptors import make_own
 from dvca_sumo.engine.forking import Child, Lineage, NotForkedError
 from dvca_sumo.engine.orders import Delivered, Died, Driven, Order, Parked, Recall
 from dvca_sumo.engine.passes import Pass, predicts_ideally, settled, summary
-from dvca_sumo.engine.processes import Failure, adopt_orphans, calculate_alone, death, print_to_descriptors, raised_here
+from dvca_sumo.engine.processes import (
+    Failure,
+    adopt_orphans,
+    calculate_alone,
+    death,
+    ignore_interrupts,
+    print_to_descriptors,
+    raised_here,
+)
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.engine.thinning import Kept
 from dvca_sumo.record import Record
@@ -70,7 +78,7 @@ class Holder:
 
     def hold(self, task: Task, roadmap_of: RoadMapOf, factory: StackFactory) -> NoReturn:
         """Drive the factual run in this process, and stay until the analysis has enough."""
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt ends
+        ignore_interrupts()
         adopt_orphans()
         make_own(self._log)
         print_to_descriptors()

@@ -30,6 +30,7 @@ else:
 
 Result = TypeVar("Result")
 
+_INTERRUPTS = (signal.SIGINT, signal.SIGTERM)  # of the terminal, and of what schedules batches
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 # What numpy's builds of OpenBLAS call it.
 _SET_THREADS = ("openblas_set_num_threads", "scipy_openblas_set_num_threads", "scipy_openblas_set_num_threads64_")
@@ -113,7 +114,7 @@ def _no_interrupts() -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _INTERRUPTS)
     try:
         yield
     finally:
@@ -121,9 +122,9 @@ def _no_interrupts() -> Iterator[None]:
 
 
 def _work(job: Callable[[], object], sender: Connection, log: Path, parent: int) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt ends
+    ignore_interrupts()
     if sys.platform != "win32":
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # see `_no_interrupts`: a held one is dropped
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _INTERRUPTS)  # see `_no_interrupts`: a held one is dropped
     die_with(parent)
     tempfile.tempdir = str(log.parent)  # so that nothing outlives a killed child
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
@@ -138,6 +139,17 @@ def _work(job: Callable[[], object], sender: Connection, log: Path, parent: int)
     sender.send(answer)
     sender.close()
     os._exit(0)  # SUMO's and the test runner's exit handlers are not this process's business
+
+
+def stop_when_terminated() -> None:
+    """Take a request to terminate, as batch systems send it, for an interrupt: nothing computed is lost."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+
+
+def ignore_interrupts() -> None:
+    """Leave it to the parent what an interrupt ends."""
+    for one in _INTERRUPTS:
+        signal.signal(one, signal.SIG_IGN)
 
 
 def print_to_descriptors() -> None:

@@ -1,4 +1,4 @@
-"""Ctrl-C half-way: what was found is kept, and nobody is left behind."""
+"""Ctrl-C, or a request to terminate, half-way: what was found is kept, and nobody is left behind."""
 
 import json
 import os
@@ -14,7 +14,9 @@ from command_line import COMMAND, environment, loaded
 from dvca_sumo.cli import ExitCode
 
 
-def interrupted(words: Sequence[str], folder: Path, is_time: Callable[[str], bool]) -> tuple[int, str, str]:
+def interrupted(
+    words: Sequence[str], folder: Path, is_time: Callable[[str], bool], by: signal.Signals = signal.SIGINT
+) -> tuple[int, str, str]:
     """Exit code and output of a command that is interrupted once it has said such a line; nobody may be left behind."""
     alive, inherited = os.pipe()  # readable as soon as no process holds its other end any more
     running = subprocess.Popen(  # noqa: S603 our own command
@@ -32,7 +34,7 @@ def interrupted(words: Sequence[str], folder: Path, is_time: Callable[[str], boo
         assert running.stderr is not None
         while not is_time(line := running.stderr.readline()):
             assert line, "it ended before that"
-        os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to parent and children alike
+        os.killpg(running.pid, by)  # as a terminal does: to parent and children alike
         out, err = running.communicate(timeout=60)
     left_behind = not select.select([alive], [], [], 20.0)[0]
     os.close(alive)
@@ -41,9 +43,10 @@ def interrupted(words: Sequence[str], folder: Path, is_time: Callable[[str], boo
 
 
 @pytest.mark.skipif(os.name != "posix", reason="process groups")
-def test_an_interrupted_analysis_prints_and_keeps_what_it_has_found(tmp_path: Path) -> None:
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_analysis_prints_and_keeps_what_it_has_found(tmp_path: Path, by: signal.Signals) -> None:
     words = ("run", "nets/cs1.sumocfg", "--fault", "perception.miss", "--json", "-o", str(tmp_path / "out"))
-    code, out, err = interrupted(words, tmp_path, lambda line: line.startswith("probe "))
+    code, out, err = interrupted(words, tmp_path, lambda line: line.startswith("probe "), by)
     assert code == ExitCode.INTERRUPTED
     assert "Traceback" not in err
     assert err.splitlines()[-1] == "interrupted"

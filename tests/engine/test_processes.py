@@ -214,8 +214,9 @@ def test_an_interrupt_ends_the_children_and_goes_on_up(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("_interruptible")
-def test_children_leave_an_interrupt_of_the_terminal_to_their_parent() -> None:
-    (answer,) = answers([lambda: [signal.raise_signal(signal.SIGINT), "still here"]])  # type: ignore[func-returns-value]
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+def test_children_leave_an_interrupt_to_their_parent(by: signal.Signals) -> None:
+    (answer,) = answers([lambda: [signal.raise_signal(by), "still here"]])  # type: ignore[func-returns-value]
     assert answer == [None, "still here"]
 
 
