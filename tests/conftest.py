@@ -1,7 +1,8 @@
-"""Small nets, built once a session with SUMO's own tools."""
+"""Small nets, built once a session with SUMO's own tools; interrupts that arrive."""
 
+import signal
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,14 @@ def _converted(folder: Path, nodes: str, edges: str, connections: str = "") -> P
     parts = [f"--{name[:-1]}-files={folder / name}" for name in ("nodes", "edges", "connections")]
     _run("netconvert", *parts, f"--output-file={folder / 'net.xml'}", "--offset.disable-normalization")
     return folder / "net.xml"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _interruptible() -> Iterator[None]:
+    """Workers of pytest-xdist and background jobs of a shell are born to ignore interrupts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="session")

@@ -183,15 +183,6 @@ def test_leaving_early_ends_what_still_runs(tmp_path: Path) -> None:
     assert not is_alive(process)
 
 
-@pytest.fixture
-def _interruptible() -> Iterator[None]:
-    """A worker of pytest-xdist ignores interrupts."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-@pytest.mark.usefixtures("_interruptible")
 def test_an_interrupt_ends_the_children_and_goes_on_up(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -213,7 +204,6 @@ def test_an_interrupt_ends_the_children_and_goes_on_up(tmp_path: Path) -> None:
     assert not is_alive(process)
 
 
-@pytest.mark.usefixtures("_interruptible")
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 def test_children_leave_an_interrupt_to_their_parent(by: signal.Signals) -> None:
     (answer,) = answers([lambda: [signal.raise_signal(by), "still here"]])  # type: ignore[func-returns-value]
@@ -249,7 +239,6 @@ def test_a_killed_parent_leaves_no_child(tmp_path: Path) -> None:
     os.close(reader)
 
 
-@pytest.mark.usefixtures("_interruptible")
 def test_an_interrupt_while_a_child_starts_is_the_parents_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """A terminal interrupts the child, too, before it ignores that."""
     fork = os.fork
