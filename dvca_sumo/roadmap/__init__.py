@@ -2,6 +2,6 @@
 
 from dvca_sumo.roadmap.lanes import Lane, RoadMapError
 from dvca_sumo.roadmap.roadmap import RoadMap
-from dvca_sumo.roadmap.route import Control, Crossing, Route, RouteError, StopLine
+from dvca_sumo.roadmap.route import Control, Crossing, Overpass, Route, RouteError, StopLine
 
-__all__ = ["Control", "Crossing", "Lane", "RoadMap", "RoadMapError", "Route", "RouteError", "StopLine"]
+__all__ = ["Control", "Crossing", "Lane", "Overpass", "RoadMap", "RoadMapError", "Route", "RouteError", "StopLine"]

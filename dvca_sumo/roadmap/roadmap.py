@@ -4,11 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import MappingProxyType
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 import shapely
 
 from dvca_sumo.roadmap.lanes import Lane
+from dvca_sumo.roadmap.levels import Levels
 from dvca_sumo.roadmap.reading import NetContents, read_net
 from dvca_sumo.roadmap.route import Route
 from dvca_sumo.roadmap.routing import route
@@ -25,6 +27,7 @@ class RoadMap:
             np.concatenate([lane.line.points for lane in self._near]), indices=np.repeat(np.arange(len(counts)), counts)
         )
         self._tree = shapely.STRtree(lines)
+        self._levels = Levels(net, self._near, self._tree)
 
     @classmethod
     def load(cls, path: Path, vehicle_class: str = "passenger") -> "RoadMap":
@@ -66,4 +69,5 @@ class RoadMap:
         edge will do. Raises RouteError when the edges do not connect for the vehicle class, or not by
         the lanes given.
         """
-        return route(self._net, edges, (start_lane, start_position), (arrival_lane, arrival_position))
+        found = route(self._net, edges, (start_lane, start_position), (arrival_lane, arrival_position))
+        return msgspec.structs.replace(found, overpasses=self._levels.overpasses(found))

@@ -73,6 +73,14 @@ class LaneChange(msgspec.Struct, frozen=True, eq=False):
         return int(np.abs(self.centres(np.array([station]))[:, 0] - offset).argmin())
 
 
+class Overpass(msgspec.Struct, frozen=True, eq=False):
+    """A lane that passes over or under the route: who is on it does not meet the ego there."""
+
+    lane: str
+    station: float  # [m]
+    position: tuple[float, float]  # [m] x, y
+
+
 class UnmappedLimit(msgspec.Struct, frozen=True, eq=False):
     """A stretch whose speed limit the map that the ego drives on does not have."""
 
@@ -102,6 +110,7 @@ class Route(msgspec.Struct, frozen=True, eq=False):
     crossings: tuple[Crossing, ...]  # by station
     unmapped_limits: tuple[UnmappedLimit, ...] = ()  # by station
     lane_changes: tuple[LaneChange, ...] = ()  # by station
+    overpasses: tuple[Overpass, ...] = ()  # by station
 
     def lane_change_at(self, station: float) -> LaneChange | None:
         """The change of lanes that is to be done at `station` [m], if there is one."""

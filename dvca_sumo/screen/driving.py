@@ -9,7 +9,7 @@ from dvca_sumo.engine.replay import roadmap
 from dvca_sumo.run import Departing, Drive, Over, Simulation, Task, built_here, opened
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.screen.results import TripOutcome, TripResult, Watch
-from dvca_sumo.screen.trips import Trip
+from dvca_sumo.screen.trips import SLOWER, Trip
 from dvca_sumo.stack.reference import StackError
 from dvca_sumo.stack.sources import StackSource, stack_factory
 from dvca_sumo.truth import Moment
@@ -18,8 +18,7 @@ from dvca_sumo.world import LONGEST_DELAY, World
 
 Heard = Callable[[float, int], None]  # the time it is [s], and how many trips are over
 
-_SLOWER = 1.5  # times what SUMO's driver takes a trip may take, when simulations are planned ...
-_SLACK = 30.0  # [s] ... and so much more
+_SLACK = 30.0  # [s] beyond `SLOWER`, a trip is expected to be under way when simulations are planned
 
 
 class Driven(msgspec.Struct, frozen=True):
@@ -34,7 +33,7 @@ def planned(trips: Sequence[Trip], concurrent: int) -> list[list[Trip]]:
     shared: list[list[Trip]] = []
     for trip in sorted(trips, key=lambda one: (one.departs, one.ego)):
         overlaps = [
-            sum(one.departs + _SLOWER * one.expected + _SLACK > trip.departs for one in some) for some in shared
+            sum(one.departs + SLOWER * one.expected + _SLACK > trip.departs for one in some) for some in shared
         ]
         if overlaps and min(overlaps) < concurrent:
             shared[overlaps.index(min(overlaps))].append(trip)

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import msgspec
 
@@ -16,6 +16,7 @@ from dvca_sumo.world import CARS, Entry, World
 
 SHORTEST = 300.0  # [m] of a trip
 FREE_FLOW, MARGIN = 1.5, 60.0  # so many times its free-flow time and so many seconds, and a trip must be over
+SLOWER = 1.5  # times what SUMO's driver takes, an ego may take
 LONGEST_WINDOW = 7200.0  # [s] of departures that are looked at where nothing says when the scenario ends
 
 _STREAM = 201
@@ -30,7 +31,7 @@ class Trip(msgspec.Struct, frozen=True):
     departs: float  # [s]
     length: float  # [m]
     free_flow: float  # [s] at the speed limits
-    expected: float  # [s] that SUMO's driver took in the plain traffic; from free flow where that is not known
+    expected: float  # [s] that SUMO's driver took in the plain traffic; from free flow for one with stops of its own
 
 
 class Draw(msgspec.Struct, frozen=True):
@@ -52,9 +53,10 @@ def drawn(scenario: Scenario, count: int) -> Draw:
     """Draw `count` trips, or as many as there are, in this process: one run of SUMO without any ADS.
 
     A trip is drivable when the vehicle is of a car's class, `--ego` accepts its name, its route is at least
-    `SHORTEST` long and can be driven on the map, and it would be over before the scenario's end. The draw goes
-    round the time windows; in each the trip is taken that begins and ends where fewest of those taken before do,
-    among equals the first by a draw keyed by the vehicle's name.
+    `SHORTEST` long and can be driven on the map, and it would be over before the scenario's end, and before an ego's
+    patience is: where traffic stands for ever, no driver's way leads anywhere. SUMO's own driver says how long it takes
+    (but for one with stops of its own). The draw goes round the time windows; in each the trip is taken that begins
+    and ends where fewest of those taken before do, among equals the first by a draw keyed by the vehicle's name.
 
     Raises:
         ScenarioError: SUMO refuses the scenario, or no trip is drivable.
@@ -66,14 +68,12 @@ def drawn(scenario: Scenario, count: int) -> Draw:
     end = math.inf if scenario.end is None else scenario.end
 
     def is_taken(entry: Entry) -> bool:
-        trip = _trip(entry, departing, durations.get(entry.ego))
+        trip = _trip(entry, departing, durations, end)
         if isinstance(trip, str):
             refused[trip] += 1
-        elif entry.time + FREE_FLOW * trip.free_flow + MARGIN > end:
-            refused["not over before the end"] += 1
-        else:
-            trips.append(trip)
-        return trips[-1:] == [trip]
+            return False
+        trips.append(trip)
+        return True
 
     departures = sum(refused.values()) + len(entries)
     _spread(_placed(scenario, entries), count, is_taken)
@@ -109,7 +109,7 @@ def _departures(
     return list(entries.values()), durations, refused
 
 
-def _trip(entry: Entry, departing: Departing, duration: float | None) -> Trip | str:
+def _trip(entry: Entry, departing: Departing, durations: Mapping[str, float], end: float) -> Trip | str:
     """The trip, or why it is none."""
     try:
         route = departing.route(entry)
@@ -119,7 +119,13 @@ def _trip(entry: Entry, departing: Departing, duration: float | None) -> Trip | 
     if length < SHORTEST:
         return f"shorter than {SHORTEST:g} m"
     freely = free_flow(route)
-    return Trip(entry.ego, entry.time, length, freely, FREE_FLOW * freely if duration is None else duration)
+    usual = FREE_FLOW * freely
+    expected = durations.get(entry.ego, usual if entry.stops else math.inf)
+    if entry.time + max(expected, usual) + MARGIN > end:
+        return "not over before the end"
+    if entry.time + SLOWER * expected > departing.latest(entry, route):
+        return "held up for longer than an ego's patience"
+    return Trip(entry.ego, entry.time, length, freely, expected)
 
 
 def _placed(scenario: Scenario, entries: Sequence[Entry]) -> list[_Departure]:

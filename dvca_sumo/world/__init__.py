@@ -7,6 +7,7 @@ from dvca_sumo.roadmap import Route
 from dvca_sumo.scenario import AUTO, Scenario, ScenarioError
 from dvca_sumo.truth import Moment
 from dvca_sumo.world.bodies import Ego, Native, shape_of
+from dvca_sumo.world.levels import on_level
 from dvca_sumo.world.obstacles import joined
 from dvca_sumo.world.session import Entry, Session
 from dvca_sumo.world.vehicle import ControlCommandError, Vehicle, VehicleLimits
@@ -112,7 +113,7 @@ class World:
     def observe(self, ego: Ego | Native) -> Moment:
         """The truth about an ego at this world step."""
         truth = ego.truth
-        moving = self._session.objects(ego.name)
+        moving = on_level(self._session.objects(ego.name), ego.route, ego.station())
         return Moment(
             ego=truth,
             shape=ego.shape,

@@ -11,8 +11,10 @@ from dvca_sumo.truth import EgoTruth
 from dvca_sumo.world.session import Entry, Motion
 from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
 
-_SEARCHED = 10.0  # [m] along the route: no ego gets farther in a world step, and a route may come by again soon
+_SEARCHED = 10.0  # [m] along the route: nobody gets farther in a world step, and a route may come by again soon
 _INDICATED = 50.0  # [m] before a junction an ego that turns at it begins to indicate
+_SIDEWAYS, _BRAKING = 2.0, 2.0  # [m/s^2] in curves and before them, of careful drivers
+_STRAIGHT = 1e-4  # [1/m]
 # By a movement's direction; T: about, in left-hand traffic.
 _SIDES = {"l": 1, "L": 1, "t": 1, "r": -1, "R": -1, "T": -1}
 
@@ -30,16 +32,13 @@ class Ego:
         self.stops = entry.stops
         self.route = route
         self.shape = shape_of(entry)
-        axle = np.array([entry.front_x, entry.front_y]) - self.shape.front * np.array(
-            [np.cos(entry.heading), np.sin(entry.heading)]
-        )
-        # SUMO's drivers may depart faster than the law allows: that would not be the ADS's doing.
-        speed = min(entry.speed, float(route.speed_limits[_row(route, route.start)]))
-        start = EgoTruth(entry.time, float(axle[0]), float(axle[1]), entry.heading, speed, 0.0, 0.0, 0.0)
+        x, y, heading = _departure(entry, route, self.shape)
+        speed = min(entry.speed, _fastest(route, self.shape))
+        start = EgoTruth(entry.time, x, y, heading, speed, 0.0, 0.0, 0.0)
         self.vehicle = Vehicle(self.shape, limits, start)
         self.signals = _signals(route)  # ids of the signal heads on its route
         self._turns = _turns(route)
-        self._station, self._station_time = route.start - self.shape.front, -1.0
+        self._way = _Way(route, self.shape)
 
     @property
     def truth(self) -> EgoTruth:
@@ -48,12 +47,7 @@ class Ego:
 
     def station(self) -> float:
         """Where its rear axle is along the route [m]; asked for once a world step at least."""
-        truth = self.vehicle.truth
-        if truth.time != self._station_time:
-            window = (self._station - _SEARCHED, self._station + _SEARCHED)
-            self._station = self.route.line.station(truth.x, truth.y, between=window)
-            self._station_time = truth.time
-        return self._station
+        return self._way.station(self.vehicle.truth)
 
     def lane(self) -> str:
         """The route's lane under its front bumper, for SUMO's map matching."""
@@ -88,12 +82,17 @@ class Native:
         self.shape = shape_of(entry)
         self.signals = _signals(route)
         self.edges = entry.edges
+        self._way = _Way(route, self.shape)
         self.truth = self._seen(
             entry.time,
             Motion(entry.front_x, entry.front_y, entry.heading, entry.speed, 0.0, is_on_road=True, edges=entry.edges),
             entry.heading,
             1.0,
         )
+
+    def station(self) -> float:
+        """Where its rear axle is along the route [m]; asked for once a world step at least."""
+        return self._way.station(self.truth)
 
     def follow(self, time: float, motion: Motion) -> None:
         """Take over how it moves at `time` [s]."""
@@ -112,6 +111,46 @@ class Native:
             yaw_rate=wrapped(heading - before) / passed,
             steering=0.0,
         )
+
+
+class _Way:
+    """How far a body has come along its route."""
+
+    def __init__(self, route: Route, shape: VehicleShape) -> None:
+        self._line = route.line
+        self._station, self._time = route.start - shape.front, -1.0
+
+    def station(self, truth: EgoTruth) -> float:
+        """Of the rear axle [m]; asked for once a world step at least."""
+        if truth.time != self._time:
+            window = (self._station - _SEARCHED, self._station + _SEARCHED)
+            self._station = self._line.station(truth.x, truth.y, between=window)
+            self._time = truth.time
+        return self._station
+
+
+def _departure(entry: Entry, route: Route, shape: VehicleShape) -> tuple[float, float, float]:
+    """The pose of the rear axle [m], [m], [rad]: along the route, as far beside it as SUMO set the vehicle down.
+
+    SUMO turns who departs at the begin of a lane towards a lane before it, whichever that is: an ego at speed
+    would have to swerve.
+    """
+    begin = route.start - shape.front
+    _, offsets = route.line.project([(entry.front_x, entry.front_y)], between=(begin, route.start + shape.front))
+    x, y, heading = route.line.poses([begin], offsets)[0].tolist()
+    return x, y, wrapped(heading)
+
+
+def _fastest(route: Route, shape: VehicleShape) -> float:
+    """How fast a careful driver would come to where the route begins [m/s].
+
+    SUMO's drivers may depart faster than the law allows, or than the next curve: that would not be the ADS's doing.
+    """
+    ahead = slice(_row(route, route.start), None)
+    to_front = np.maximum(route.line.stations[ahead] - route.start, 0.0)
+    in_curves = _SIDEWAYS / np.maximum(np.abs(route.curvatures[ahead]), _STRAIGHT)
+    squares = np.minimum(route.speed_limits[ahead] ** 2, in_curves + 2.0 * _BRAKING * shape.front)
+    return math.sqrt(float((squares + 2.0 * _BRAKING * to_front).min()))
 
 
 def _row(route: Route, station: float) -> int:

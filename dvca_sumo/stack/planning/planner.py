@@ -112,7 +112,7 @@ class Planner:
         lateral = lateral_start(start, window, offset)
         nudges = self._nudging.step(Situation(time, start.speed, lateral, window, scene, views))
         path = path_along(window, start, lateral, [nudge.plateau for nudge in nudges], shape, config)
-        graph = graph_of(scene, window, path, self._route.crossings, shape, config)
+        graph = graph_of(scene, window, path, self._route, shape, config)
         profile = self._profile(start, graph, views, choice)
         return _points(path, profile), profile.label or _described(nudges, path)
 

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.messages import PREDICTION_TIMES, Floats, ObjectClass, VehicleShape
-from dvca_sumo.roadmap.route import Crossing
+from dvca_sumo.roadmap.route import Crossing, Overpass, Route
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Path
 from dvca_sumo.stack.planning.reference import BEHIND, Window
@@ -20,6 +20,7 @@ _NEVER = 1e4  # [m] for places where there is no leader
 _ENDS = np.array([0.0, -1.0, 1.0])[:, None, None]  # an object's middle, near and far end, in half lengths
 _LANE_ROOM = 0.3  # [m] of lane beside the ego's width that is enough for `trusts_lane_room`
 _AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
+_BRIDGE = 20.0  # [m] of path under a bridge, before and after the middle of a lane on it
 
 
 class Graph(msgspec.Struct, frozen=True, eq=False):
@@ -45,11 +46,11 @@ def graph_of(
     scene: Scene,
     window: Window,
     path: Path,
-    crossings: tuple[Crossing, ...],
+    route: Route,
     shape: VehicleShape,
     config: PlanningConfig,
 ) -> Graph:
-    """What comes within its margin of where the ego's body passes, at or ahead of the rear bumper."""
+    """What comes within its margin of where the ego's body passes, at or ahead of the rear bumper, on its level."""
     futures = scene.futures
     # The body may pass an object's middle with room to spare and yet sweep over its near or far end.
     rows = window.index(futures.stations + _ENDS * futures.half_lengths)
@@ -62,12 +63,23 @@ def graph_of(
     stretch[BEHIND:] = path.arcs - np.arange(count)
     centres = futures.stations + stretch[rows[0]]
     low, high = centres - futures.half_lengths, centres + futures.half_lengths
-    occupied = gaps < _margins(scene, window, crossings, config)[:, None]
+    occupied = gaps < _margins(scene, window, route.crossings, config)[:, None]
     occupied &= (high > -shape.rear_overhang) & (futures.stations < count - 2)
+    for overpass in route.overpasses:
+        _pass_over(occupied, overpass, scene, window)
     if config.trusts_lane_room:
         occupied[scene.moving :][_has_lane_room(scene, window, shape)] = False
     last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)
     return Graph(window, path, scene, occupied, gaps, low, high, occupied.argmax(axis=1).tolist(), last.tolist())
+
+
+def _pass_over(occupied: Flags, overpass: Overpass, scene: Scene, window: Window) -> None:
+    """Free the path of those who get to it by a lane that passes over or under it."""
+    ahead = overpass.station - window.station
+    if not -_BRIDGE < ahead < window.rows.shape[1] - BEHIND + _BRIDGE:
+        return
+    rows = [row for row, lanes in enumerate(scene.lanes) if overpass.lane in lanes]
+    occupied[rows] &= np.abs(scene.futures.stations[rows] - ahead) > _BRIDGE
 
 
 def _has_lane_room(scene: Scene, window: Window, shape: VehicleShape) -> Flags:

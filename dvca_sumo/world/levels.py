@@ -1,0 +1,33 @@
+"""Bodies on bridges over an ego, and under those that it drives on: it does not meet them."""
+
+import math
+
+import numpy as np
+
+from dvca_sumo.roadmap import Route
+from dvca_sumo.truth import ObjectsTruth
+
+_BRIDGE = 30.0  # [m] around the place where two lanes pass over each other
+_AROUND = 200.0  # [m] along the route: it may come by again on the other level
+
+
+def on_level(objects: ObjectsTruth, route: Route, station: float) -> ObjectsTruth:
+    """The objects without those that are on another level than an ego at `station` [m] of its route."""
+    places = {one.lane: one.position for one in route.overpasses if abs(one.station - station) <= _AROUND}
+    there = [
+        row
+        for row, lane in enumerate(objects.lanes if places else ())
+        if lane in places and math.dist(places[lane], objects.boxes[row, :2].tolist()) <= _BRIDGE
+    ]
+    if not there:
+        return objects
+    rows = np.delete(np.arange(len(objects.ids)), there)
+    kept = rows.tolist()
+    return ObjectsTruth(
+        objects.time,
+        tuple(objects.ids[row] for row in kept),
+        objects.classes[rows],
+        objects.boxes[rows],
+        objects.velocities[rows],
+        tuple(objects.lanes[row] for row in kept),
+    )
