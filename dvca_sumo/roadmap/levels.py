@@ -51,7 +51,7 @@ class Levels:
         own = lines[self._rows[lane.id]]
         for row in sorted(self._tree.query(own, predicate="crosses").tolist()):
             other = self._lanes[row]
-            if lane.is_internal and other.is_internal or self._junctions[lane.edge] & self._junctions[other.edge]:
+            if (lane.is_internal and other.is_internal) or self._junctions[lane.edge] & self._junctions[other.edge]:
                 continue
             for x, y in shapely.get_coordinates(shapely.intersection(own, lines[row])).tolist():
                 if _is_inside(lane, x, y) and _is_inside(other, x, y) and _angle(lane, other, x, y) > _ANGLE:

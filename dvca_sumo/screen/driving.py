@@ -32,9 +32,7 @@ def planned(trips: Sequence[Trip], concurrent: int) -> list[list[Trip]]:
     """Trips shared out among simulations so that never more than `concurrent` are expected to be under way."""
     shared: list[list[Trip]] = []
     for trip in sorted(trips, key=lambda one: (one.departs, one.ego)):
-        overlaps = [
-            sum(one.departs + SLOWER * one.expected + _SLACK > trip.departs for one in some) for some in shared
-        ]
+        overlaps = [sum(one.departs + SLOWER * one.expected + _SLACK > trip.departs for one in some) for some in shared]
         if overlaps and min(overlaps) < concurrent:
             shared[overlaps.index(min(overlaps))].append(trip)
         else:

@@ -1,5 +1,6 @@
 """Waiting for an ego: chosen, late, hindered, never; and an ego that is taken away."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,7 @@ from watched_world import STANDING, entered
 
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.scenario import ScenarioError, load_scenario
-from dvca_sumo.world import VehicleLimits, World
+from dvca_sumo.world import Ego, VehicleLimits, World
 
 FLOW = '<flow id="many" from="ab" to="bc" begin="0" period="2" number="60"/>'
 
@@ -102,3 +103,39 @@ def test_a_dismissed_ego_is_gone_and_the_world_goes_on(tmp_path: Path, street: P
         return seen
 
     assert in_child(job) == [("ego",)] * 3 + [()] * 3
+
+
+def entered_ego(config: Path, net: Path) -> Ego:
+    """The ego as the world adopts it, with the route to the end of its last edge."""
+    entry = entered(config)
+    roadmap = RoadMap.load(net)
+    end = roadmap.lanes[f"{entry.edges[-1]}_0"].length
+    return Ego(entry, roadmap.route(entry.edges, entry.lane, entry.position, None, end), VehicleLimits())
+
+
+def test_an_ego_departs_along_its_route_wherever_sumo_turned_it(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    """SUMO lets a vehicle at the begin of its lane point along a road that leads there."""
+    nodes = '<node id="a" x="-100" y="-100"/><node id="b" x="0" y="0"/><node id="c" x="200" y="0"/>'
+    edges = '<edge id="ab" from="a" to="b" speed="13.9"/><edge id="bc" from="b" to="c" speed="13.9"/>'
+    ego = '<vehicle id="ego" depart="0" departPos="0" departSpeed="10"><route edges="bc"/></vehicle>'
+    net = plain_file(nodes, edges)
+    config = scenario_file(tmp_path, net, ego)
+    assert entered(config).heading > 0.2
+    truth = entered_ego(config, net).truth
+    assert (truth.heading, truth.speed) == pytest.approx((0.0, 10.0), abs=1e-3)
+    assert truth.y == pytest.approx(-1.6, abs=1e-2)
+
+
+@pytest.mark.parametrize(("position", "slowest", "fastest"), [("102", 3.0, 9.0), ("20", 10.0, 10.0)])
+def test_an_ego_departs_no_faster_than_the_next_turn_allows(
+    tmp_path: Path, plain_file: Callable[..., Path], position: str, slowest: float, fastest: float
+) -> None:
+    nodes = '<node id="a" x="0" y="0"/><node id="b" x="120" y="0"/><node id="c" x="120" y="-120"/>'
+    edges = '<edge id="ab" from="a" to="b" speed="13.9"/><edge id="bc" from="b" to="c" speed="13.9"/>'
+    ego = f'<vehicle id="ego" depart="0" departPos="{position}" departSpeed="10"><route edges="ab bc"/></vehicle>'
+    net = plain_file(nodes, edges)
+    config = scenario_file(tmp_path, net, ego)
+    assert entered(config).speed == 10.0
+    assert slowest <= entered_ego(config, net).truth.speed <= fastest

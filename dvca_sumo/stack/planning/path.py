@@ -7,6 +7,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
 from dvca_sumo.messages import Floats, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
@@ -110,11 +111,12 @@ def path_along(
     squared_cosines = 1.0 / (1.0 + tangents * tangents)
     arcs = np.zeros(count)
     np.hypot(x[1:] - x[:-1], y[1:] - y[:-1]).cumsum(out=arcs[1:])
-    left, right = _swept(offsets, slopes, curvatures, shape)
+    headings = window.headings[ahead] + np.arctan(tangents)
+    left, right = _swept(x, y, headings, window, shape)
     return Path(
         x=x,
         y=y,
-        headings=window.headings[ahead] + np.arctan(tangents),
+        headings=headings,
         curvatures=(curvatures + bends * squared_cosines / scale) * np.sqrt(squared_cosines) / scale,
         arcs=arcs,
         left=left,
@@ -195,19 +197,21 @@ def _upper_terms(rise: float, first: float, second: float) -> tuple[float, float
     return third, fourth, 6.0 * gap - 3.0 * slope_gap + 0.5 * bend_gap
 
 
-def _swept(offsets: Floats, slopes: Floats, curvatures: Floats, shape: VehicleShape) -> tuple[Floats, Floats]:
-    """Where the sides of the body pass each station: the body is straight and turns about the rear axle."""
-    half = 0.5 * shape.width
-    halves = half * np.sqrt(1.0 + slopes * slopes)
-    # Each row: sides of the body so many metres ahead of the axle, by where the axle is.
-    ahead = np.arange(math.ceil(shape.front) + 1.0)[:, None]
-    turned = (slopes - 0.5 * ahead * curvatures) * ahead
-    lefts, rights = (offsets + halves) + turned, (offsets - halves) + turned
-    left, right = np.empty(BEHIND + len(offsets)), np.empty(BEHIND + len(offsets))
-    left[:BEHIND], right[:BEHIND] = offsets[0] + half, offsets[0] - half
-    left[BEHIND:], right[BEHIND:] = lefts[0], rights[0]
-    for metres in range(1, len(ahead)):
-        part = slice(BEHIND + metres, None)
-        np.maximum(left[part], lefts[metres, :-metres], out=left[part])
-        np.minimum(right[part], rights[metres, :-metres], out=right[part])
-    return left, right
+def _swept(x: Floats, y: Floats, headings: Floats, window: Window, shape: VehicleShape) -> tuple[Floats, Floats]:
+    """Where the sides of the body pass each station: it is straight ahead of the rear axle, however the line bends."""
+    half, metres = 0.5 * shape.width, math.ceil(shape.front) + 1
+    count = len(x) - metres + 1
+    ahead = np.minimum(np.arange(metres, dtype=np.float64), shape.front)  # of the axle, each a station farther
+    line = window.rows[:4, BEHIND:]
+    axle = (y - line[1]) * line[2] - (x - line[0]) * line[3]
+    x_ahead, y_ahead, cosines, sines = sliding_window_view(line, metres, axis=1)
+    turned = headings[:count, None]
+    offsets = (y[:count, None] + ahead * np.sin(turned) - y_ahead) * cosines
+    offsets -= (x[:count, None] + ahead * np.cos(turned) - x_ahead) * sines
+    left = np.concatenate((np.full(BEHIND, axle[0]), axle))
+    right = left.copy()
+    for metre in range(1, metres):
+        part = slice(BEHIND + metre, BEHIND + metre + count)
+        np.maximum(left[part], offsets[:, metre], out=left[part])
+        np.minimum(right[part], offsets[:, metre], out=right[part])
+    return left + half, right - half

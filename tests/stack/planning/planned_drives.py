@@ -20,7 +20,7 @@ from dvca_sumo.messages import (
     Trajectory,
     VehicleShape,
 )
-from dvca_sumo.roadmap.route import Control, Crossing, Route, StopLine, UnmappedLimit
+from dvca_sumo.roadmap.route import Control, Crossing, Overpass, Route, StopLine, UnmappedLimit
 from dvca_sumo.stack.planning import Planner, PlanningConfig
 
 SHAPE = VehicleShape(length=4.6, width=1.8, wheelbase=2.7, rear_overhang=0.9)
@@ -50,6 +50,7 @@ def road(
     stop_lines: Sequence[StopLine] = (),
     crossings: Sequence[Crossing] = (),
     unmapped_limits: Sequence[UnmappedLimit] = (),
+    overpasses: Sequence[Overpass] = (),
 ) -> Route:
     """One lane 3.2 m wide along `points`, `lanes_left` more of the same direction to its left."""
     line = Polyline(straight_points() if points is None else points)
@@ -68,6 +69,7 @@ def road(
         stop_lines=tuple(stop_lines),
         crossings=tuple(crossings),
         unmapped_limits=tuple(unmapped_limits),
+        overpasses=tuple(overpasses),
     )
 
 

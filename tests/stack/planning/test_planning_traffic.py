@@ -8,7 +8,7 @@ import pytest
 from planned_drives import SHAPE, assert_drivable, believed, car, drive, person, predicted, road, stop_line
 
 from dvca_sumo.messages import SignalColour
-from dvca_sumo.roadmap.route import Control, Crossing
+from dvca_sumo.roadmap.route import Control, Crossing, Overpass
 from dvca_sumo.stack.planning import Planner, PlanningConfig
 
 UP, DOWN = math.pi / 2.0, -math.pi / 2.0
@@ -210,3 +210,10 @@ def test_object_without_a_future_stays_where_it_is() -> None:
     )
     trajectory = Planner(PlanningConfig(), road(), SHAPE).step(believed(5.0, speed=8.0), unknown, {})
     assert trajectory.points[-1, 1] + SHAPE.front < 30.0 - 2.25
+
+
+@pytest.mark.parametrize("lane", ["bridge_0", "side_0"])
+def test_who_comes_by_a_bridge_is_no_reason_to_slow_down(lane: str) -> None:
+    other = car(3, 100.0, -80.0, heading=UP, speed=12.0, lanes=(lane,))
+    driven = drive(road(overpasses=[Overpass("bridge_0", 100.0, (100.0, 0.0))]), 12.0, speed=13.0, actors=[other])
+    assert (driven.speeds.min() > 12.9) == (lane == "bridge_0")
