@@ -55,6 +55,13 @@ def corners(boxes: Floats) -> Floats:
     )
 
 
+def outlines(boxes: Floats, parts: int) -> Floats:
+    """Points all around each box, so many a side and the corners among them: (n, 5) -> (n, 4 parts, 2)."""
+    ends = corners(boxes)[:, :, None]
+    shares = np.linspace(0.0, 1.0, parts, endpoint=False)[:, None]
+    return (ends + shares * (np.roll(ends, -1, axis=1) - ends)).reshape(len(boxes), -1, 2)
+
+
 def radii(boxes: Floats) -> Floats:
     """Half the diagonal of each box [m], (..., 5) -> (...): no point of the box is farther from its centre."""
     return 0.5 * np.hypot(boxes[..., 3], boxes[..., 4])

@@ -14,7 +14,7 @@ from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.right_of_way import crossings, stop_line
 from dvca_sumo.roadmap.route import Route, RouteError, UnmappedLimit
 from dvca_sumo.roadmap.smoothing import smoothed, stepped
-from dvca_sumo.roadmap.steering import steered, unsteerable
+from dvca_sumo.roadmap.steering import PART, WHOLE, steered, straying, unsteerable
 
 _BEFORE = 20.0  # [m] of lane shown behind the start, as far as there is any
 _RUN_UP = 10.0  # [m] of line behind the start in any case: the rear axle needs a line under it
@@ -158,12 +158,18 @@ def _draw_leg(net: NetContents, drawing: Drawing, leg: Leg, begin: float, end: f
 def _steerable(net: NetContents, plan: _Plan, points: Floats, along: Floats, begin: float) -> tuple[Floats, Floats]:
     """The smooth line, drawn anew where no car could follow it; `along` counts from `begin` of the rough line."""
     line = Polyline(points)
-    sharp = unsteerable(line)
-    if not sharp.any():
-        return points, along
     room = _bounds(net, plan, line, along + begin)
-    points, stations = steered(line, sharp, room.road_left, room.road_right)
-    return points, np.interp(stations, line.stations, along)
+    sharp = unsteerable(line)
+    if sharp.any():
+        points, stations = steered(line, sharp, room.road_left, room.road_right, WHOLE)
+        along = np.interp(stations, line.stations, along)
+        line = Polyline(points)
+        room = _bounds(net, plan, line, along + begin)
+    out = straying(line, room.lane_left, room.lane_right)
+    if out.any():
+        points, stations = steered(line, out, room.lane_left, room.lane_right, PART)
+        along = np.interp(stations, line.stations, along)
+    return points, along
 
 
 def _bounds(net: NetContents, plan: _Plan, line: Polyline, along: Floats) -> Bounds:

@@ -9,7 +9,7 @@ from dvca_sumo.geometry.polyline import Floats, Polyline
 from dvca_sumo.roadmap.easing import eased
 
 _FINE = 0.25  # [m] between points while smoothing
-_KERNELS = (0.5, 1.0, 2.0, 4.0)  # [m] standard deviations; the first always applies
+_KERNELS = (0.5, 1.0, 2.0, 4.0, 8.0)  # [m] standard deviations; the first always applies
 _DEVIATION = 0.25  # [m] from the rough line that wider kernels may cause
 _TIGHT = 0.15  # [1/m] curvature from which on a vehicle needs a wider turn
 _TIGHT_DEVIATION = 0.6  # [m] allowed there: a car still stays in a lane of 3.2 m

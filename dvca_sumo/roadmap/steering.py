@@ -24,9 +24,8 @@ _QUICKEST = 0.05  # [1/m^2] drawn instead
 _REVERSAL = 2.0  # [m] before and after: a shorter kink moves no car off the line
 _FRONT, _REAR, _HALF_WIDTH = 4.1, 0.9, 0.9  # [m] such a car's body around its rear axle
 _CORNERS = np.array([(ahead, side) for ahead in (_FRONT, -_REAR) for side in (_HALF_WIDTH, -_HALF_WIDTH)])
+_STRAY = 0.15  # [m] a corner beyond the edge of the lane that the line is drawn anew for
 _CLEARANCE = 0.1  # [m] wanted between a corner and the road's edge
-_RUN_UP = 20.0  # [m] before and after a sharp place over which the line may move
-_STEP = 0.5  # [m] length of an arc, about
 _LEAP = 5.0  # [m] of line at most are abreast of half an arc that cuts a corner
 _ITERATIONS = 60
 _ENOUGH = 1e-4  # relative gain of a step that is not worth another one
@@ -37,6 +36,17 @@ _TOO_SHARP = 300.0  # [m] and [m^2]: too sharp, too quick
 _OFF_ROAD = 1.0  # [1/m]
 _OFF_LINE = 0.1  # [1/m]
 _CHANGE = 5.0  # [m^2] of curvature along the way
+
+
+class Redrawing(NamedTuple):
+    """How the line is drawn anew."""
+
+    run_up: float  # [m] before and after a place over which the line may move
+    step: float  # [m] length of an arc, about
+
+
+WHOLE = Redrawing(20.0, 0.5)  # a turn that cannot be driven
+PART = Redrawing(12.0, 1.0)  # one that only wants to be driven better
 
 
 class _Window(msgspec.Struct, frozen=True, eq=False):
@@ -79,7 +89,29 @@ def unsteerable(line: Polyline) -> npt.NDArray[np.bool_]:
     return sharp | (np.abs(ahead - behind) > 2.0 * _REVERSAL * _TOO_QUICK)
 
 
-def steered(line: Polyline, sharp: npt.NDArray[np.bool_], left: Floats, right: Floats) -> tuple[Floats, Floats]:
+def straying(line: Polyline, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
+    """Which points lie where a corner of a car whose rear axle follows the line leaves `left` or `right`.
+
+    These are the edges of its lane at each point of `line` [m].
+    """
+    stations = line.stations
+    poses = line.poses(stations)
+    out = np.zeros(len(stations), dtype=np.bool_)
+    for ahead, side in _CORNERS:
+        abreast = np.clip(stations + ahead, 0.0, line.length)
+        frames = line.poses(abreast)
+        x = poses[:, 0] + ahead * np.cos(poses[:, 2]) - side * np.sin(poses[:, 2]) - frames[:, 0]
+        y = poses[:, 1] + ahead * np.sin(poses[:, 2]) + side * np.cos(poses[:, 2]) - frames[:, 1]
+        offsets = y * np.cos(frames[:, 2]) - x * np.sin(frames[:, 2])
+        edges = (np.interp(abreast, stations, edge) for edge in (left, right))
+        out |= (offsets > next(edges) + _STRAY) | (offsets < next(edges) - _STRAY)
+    inner = (stations > _FRONT) & (stations < line.length - _FRONT)
+    return out & inner
+
+
+def steered(
+    line: Polyline, sharp: npt.NDArray[np.bool_], left: Floats, right: Floats, how: Redrawing
+) -> tuple[Floats, Floats]:
     """Points of the line, drawn anew around `sharp` ones, and the station on `line` of each [m].
 
     `left`, `right`: the road's edges at each point of `line` [m]. No drawn curve is sharper than 0.2 1/m
@@ -87,26 +119,26 @@ def steered(line: Polyline, sharp: npt.NDArray[np.bool_], left: Floats, right: F
     direction.
     """
     parts, stations, done = [], [], 0
-    for rows in _stretches(line, sharp):
+    for rows in _stretches(line, sharp, how.run_up):
         window = _Window(Polyline(line.points[rows]), left[rows], right[rows])
-        points = _drawn(window)
+        points = _drawn(window, how.step)
         parts += [line.points[done : rows.start], points]
         stations += [line.stations[done : rows.start], line.stations[rows.start] + _abreast(window.line, points)]
         done = rows.stop
     return np.concatenate([*parts, line.points[done:]]), np.concatenate([*stations, line.stations[done:]])
 
 
-def _stretches(line: Polyline, sharp: npt.NDArray[np.bool_]) -> Iterator[slice]:
+def _stretches(line: Polyline, sharp: npt.NDArray[np.bool_], run_up: float) -> Iterator[slice]:
     """Runs of sharp points with their run-ups; runs whose run-ups meet are one."""
     rows, stations = np.flatnonzero(sharp), line.stations
-    for run in np.split(rows, np.flatnonzero(np.diff(stations[rows]) > 2.0 * _RUN_UP + _STEP) + 1):
-        begin, end = np.searchsorted(stations, (stations[run[0]] - _RUN_UP, stations[run[-1]] + _RUN_UP))
+    for run in np.split(rows, np.flatnonzero(np.diff(stations[rows]) > 2.0 * run_up) + 1):
+        begin, end = np.searchsorted(stations, (stations[run[0]] - run_up, stations[run[-1]] + run_up))
         yield slice(int(begin), int(min(end + 1, len(stations))))
 
 
-def _drawn(window: _Window) -> Floats:
+def _drawn(window: _Window, length: float) -> Floats:
     """The window's line, drawn anew: points at half the arcs' length."""
-    count = max(round(window.line.length / _STEP), 4)
+    count = max(round(window.line.length / length), 4)
     step = window.line.length / count
     ends = window.line.poses([0.0, window.line.length])
     turns = np.diff(window.line.poses(np.linspace(0.0, window.line.length, count + 1))[:, 2])

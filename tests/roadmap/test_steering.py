@@ -8,7 +8,7 @@ from soundness import check_sound
 
 from dvca_sumo.geometry.polyline import Floats, Polyline
 from dvca_sumo.roadmap import RoadMap
-from dvca_sumo.roadmap.steering import steered, unsteerable
+from dvca_sumo.roadmap.steering import WHOLE, steered, unsteerable
 
 NetBuilder = Callable[..., RoadMap]
 
@@ -40,7 +40,7 @@ def room(line: Polyline, half: float) -> tuple[Floats, Floats]:
 
 
 def redrawn(line: Polyline, half: float) -> Polyline:
-    return Polyline(steered(line, unsteerable(line), *room(line, half))[0])
+    return Polyline(steered(line, unsteerable(line), *room(line, half), WHOLE)[0])
 
 
 def sharpest(line: Polyline) -> float:
@@ -89,7 +89,7 @@ def test_line_swings_out_before_the_corner_and_cuts_in_at_it() -> None:
 
 def test_rest_of_the_line_is_left_as_it_is() -> None:
     line = corner(0.5, 0.5 * np.pi)
-    points, stations = steered(line, unsteerable(line), *room(line, 1.6))
+    points, stations = steered(line, unsteerable(line), *room(line, 1.6), WHOLE)
     kept = (stations < 7.0) | (stations > line.length - 7.0)
     assert kept.sum() > 50
     assert line.poses(stations[kept])[:, :2] == pytest.approx(points[kept], abs=1e-9)

@@ -7,7 +7,10 @@ import pytest
 from small_scenarios import scenario_file
 from watched_world import objects_of, watched
 
-NODES = '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/><node id="s" x="200" y="-150"/><node id="n" x="200" y="150"/>'
+NODES = "".join(
+    f'<node id="{name}" x="{x}" y="{y}"/>'
+    for name, x, y in (("w", 0, 0), ("e", 400, 0), ("s", 200, -150), ("n", 200, 150))
+)
 EDGES = '<edge id="we" from="w" to="e" speed="13.9"/><edge id="sn" from="s" to="n" speed="13.9"/>'
 EGO = '<trip id="ego" from="we" to="we" depart="0" departPos="150" departSpeed="0" departLane="0"/>'
 

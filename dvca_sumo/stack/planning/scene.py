@@ -35,6 +35,7 @@ class Scene(msgspec.Struct, frozen=True, eq=False):
 
     ids: list[int]  # (n,)
     classes: Integers  # (n,)
+    boxes: Floats  # (n, 5) as in `TrackedObjects`
     speeds: Floats  # (n,) [m/s]
     is_standing: Flags  # (n,) not predicted to go anywhere
     now: Extents  # (n,)
@@ -75,6 +76,7 @@ def scene_in(
     return Scene(
         ids=ids,
         classes=objects.classes,
+        boxes=objects.boxes,
         speeds=speeds,
         is_standing=standing,
         now=now,

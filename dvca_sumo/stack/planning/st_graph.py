@@ -3,6 +3,7 @@
 import msgspec
 import numpy as np
 
+from dvca_sumo.geometry.boxes import outlines
 from dvca_sumo.messages import PREDICTION_TIMES, Floats, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Crossing, Overpass, Route
 from dvca_sumo.stack.planning.config import PlanningConfig
@@ -20,6 +21,8 @@ _NEVER = 1e4  # [m] for places where there is no leader
 _ENDS = np.array([0.0, -1.0, 1.0])[:, None, None]  # an object's middle, near and far end, in half lengths
 _LANE_ROOM = 0.3  # [m] of lane beside the ego's width that is enough for `trusts_lane_room`
 _AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
+_DOUBT = 1.0  # [m] gaps to what stands, and overlaps, up to which its outline is looked at
+_PARTS = 12  # of each side of an outline
 _BRIDGE = 20.0  # [m] of path under a bridge, before and after the middle of a lane on it
 
 
@@ -58,6 +61,7 @@ def graph_of(
         futures.offsets - futures.half_widths - path.left[rows].max(axis=0),
         path.right[rows].min(axis=0) - futures.offsets - futures.half_widths,
     )
+    _look_closely(gaps[scene.moving :], scene, window, path)
     count = len(path.arcs)
     stretch = np.zeros(BEHIND + count)
     stretch[BEHIND:] = path.arcs - np.arange(count)
@@ -71,6 +75,18 @@ def graph_of(
         occupied[scene.moving :][_has_lane_room(scene, window, shape)] = False
     last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)
     return Graph(window, path, scene, occupied, gaps, low, high, occupied.argmax(axis=1).tolist(), last.tolist())
+
+
+def _look_closely(gaps: Floats, scene: Scene, window: Window, path: Path) -> None:
+    """Correct the gaps (s, t) to those who stand aslant, or beside a bend: extents are more than they are."""
+    doubtful = (np.abs(gaps[:, 0]) < _DOUBT).nonzero()[0]
+    if not doubtful.size:
+        return
+    points = outlines(scene.boxes[scene.owners[scene.moving + doubtful]], _PARTS)
+    stations, offsets, _ = window.project(points.reshape(-1, 2))
+    rows = window.index(stations)
+    beside = np.maximum(offsets - path.left[rows], path.right[rows] - offsets)
+    gaps[doubtful] = beside.reshape(len(doubtful), -1).min(axis=1)[:, None]
 
 
 def _pass_over(occupied: Flags, overpass: Overpass, scene: Scene, window: Window) -> None:
