@@ -26,6 +26,7 @@ _FRONT, _REAR, _HALF_WIDTH = 4.1, 0.9, 0.9  # [m] such a car's body around its r
 _CORNERS = np.array([(ahead, side) for ahead in (_FRONT, -_REAR) for side in (_HALF_WIDTH, -_HALF_WIDTH)])
 _STRAY = 0.15  # [m] a corner beyond the edge of the lane that the line is drawn anew for
 _CLEARANCE = 0.1  # [m] wanted between a corner and the road's edge
+_BETWEEN = 0.25  # [m] points of the line, about
 _LEAP = 5.0  # [m] of line at most are abreast of half an arc that cuts a corner
 _ITERATIONS = 60
 _ENOUGH = 1e-4  # relative gain of a step that is not worth another one
@@ -89,24 +90,28 @@ def unsteerable(line: Polyline) -> npt.NDArray[np.bool_]:
     return sharp | (np.abs(ahead - behind) > 2.0 * _REVERSAL * _TOO_QUICK)
 
 
-def straying(line: Polyline, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
-    """Which points lie where a corner of a car whose rear axle follows the line leaves `left` or `right`.
-
-    These are the edges of its lane at each point of `line` [m].
-    """
+def swept(line: Polyline) -> tuple[Floats, Floats]:
+    """How far to the left and right of each point of the line [m] a car comes whose rear axle follows it: (n,), (n,)."""
     stations = line.stations
     poses = line.poses(stations)
-    out = np.zeros(len(stations), dtype=np.bool_)
+    left, right = np.full(len(stations), _HALF_WIDTH), np.full(len(stations), -_HALF_WIDTH)
     for ahead, side in _CORNERS:
-        abreast = np.clip(stations + ahead, 0.0, line.length)
+        abreast = stations + ahead
         frames = line.poses(abreast)
         x = poses[:, 0] + ahead * np.cos(poses[:, 2]) - side * np.sin(poses[:, 2]) - frames[:, 0]
         y = poses[:, 1] + ahead * np.sin(poses[:, 2]) + side * np.cos(poses[:, 2]) - frames[:, 1]
         offsets = y * np.cos(frames[:, 2]) - x * np.sin(frames[:, 2])
-        edges = (np.interp(abreast, stations, edge) for edge in (left, right))
-        out |= (offsets > next(edges) + _STRAY) | (offsets < next(edges) - _STRAY)
-    inner = (stations > _FRONT) & (stations < line.length - _FRONT)
-    return out & inner
+        after = np.minimum(stations.searchsorted(abreast), len(stations) - 1)
+        for rows in (after, np.maximum(after - 1, 0)):
+            np.maximum.at(left, rows, offsets)
+            np.minimum.at(right, rows, offsets)
+    return left, right
+
+
+def straying(line: Polyline, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
+    """Which points lie where a car whose rear axle follows the line leaves its lane, `left` to `right` of it [m]."""
+    leftmost, rightmost = swept(line)
+    return (leftmost > left + _STRAY) | (rightmost < right - _STRAY)
 
 
 def steered(
@@ -137,7 +142,7 @@ def _stretches(line: Polyline, sharp: npt.NDArray[np.bool_], run_up: float) -> I
 
 
 def _drawn(window: _Window, length: float) -> Floats:
-    """The window's line, drawn anew: points at half the arcs' length."""
+    """The window's line, drawn anew of arcs of about that length [m]."""
     count = max(round(window.line.length / length), 4)
     step = window.line.length / count
     ends = window.line.poses([0.0, window.line.length])
@@ -159,8 +164,9 @@ def _drawn(window: _Window, length: float) -> Floats:
             damping *= 4.0
         if 0.0 < gain < _ENOUGH:
             break
-    halved = np.append(np.repeat(0.5 * unknowns[:-1], 2), 0.5 * unknowns[-1])
-    points = _chain(halved, ends[0]).points
+    parts = round(length / _BETWEEN)
+    finer = np.append(np.repeat(unknowns[:-1] / parts, parts), unknowns[-1] / parts)
+    points = _chain(finer, ends[0]).points
     missed = ends[1, :2] - points[-1]  # a few millimetres
     points += np.linspace(0.0, 1.0, len(points))[:, None] * missed
     return points

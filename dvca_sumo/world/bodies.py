@@ -32,10 +32,7 @@ class Ego:
         self.stops = entry.stops
         self.route = route
         self.shape = shape_of(entry)
-        x, y, heading = _departure(entry, route, self.shape)
-        speed = min(entry.speed, _fastest(route, self.shape))
-        start = EgoTruth(entry.time, x, y, heading, speed, 0.0, 0.0, 0.0)
-        self.vehicle = Vehicle(self.shape, limits, start)
+        self.vehicle = Vehicle(self.shape, limits, _departure(entry, route, self.shape))
         self.signals = _signals(route)  # ids of the signal heads on its route
         self._turns = _turns(route)
         self._way = _Way(route, self.shape)
@@ -129,16 +126,19 @@ class _Way:
         return self._station
 
 
-def _departure(entry: Entry, route: Route, shape: VehicleShape) -> tuple[float, float, float]:
-    """The pose of the rear axle [m], [m], [rad]: along the route, as far beside it as SUMO set the vehicle down.
+def _departure(entry: Entry, route: Route, shape: VehicleShape) -> EgoTruth:
+    """An ego on its way along the route, as far beside it as SUMO set it down beside its lane.
 
-    SUMO turns who departs at the begin of a lane towards a lane before it, whichever that is: an ego at speed
-    would have to swerve.
+    SUMO turns who departs at the begin of a lane towards a lane before it, whichever that is, and a route does not
+    always keep to the middle of a lane: an ego at speed would have to swerve.
     """
-    begin = route.start - shape.front
-    _, offsets = route.line.project([(entry.front_x, entry.front_y)], between=(begin, route.start + shape.front))
-    x, y, heading = route.line.poses([begin], offsets)[0].tolist()
-    return x, y, wrapped(heading)
+    axle = route.start - shape.front
+    x, y, heading = route.line.poses([axle], entry.beside)[0].tolist()
+    speed = min(entry.speed, _fastest(route, shape))
+    curvature = float(np.interp(axle, route.line.stations, route.curvatures))
+    return EgoTruth(
+        entry.time, x, y, wrapped(heading), speed, 0.0, speed * curvature, math.atan(shape.wheelbase * curvature)
+    )
 
 
 def _fastest(route: Route, shape: VehicleShape) -> float:
@@ -146,11 +146,16 @@ def _fastest(route: Route, shape: VehicleShape) -> float:
 
     SUMO's drivers may depart faster than the law allows, or than the next curve: that would not be the ADS's doing.
     """
-    ahead = slice(_row(route, route.start), None)
-    to_front = np.maximum(route.line.stations[ahead] - route.start, 0.0)
-    in_curves = _SIDEWAYS / np.maximum(np.abs(route.curvatures[ahead]), _STRAIGHT)
-    squares = np.minimum(route.speed_limits[ahead] ** 2, in_curves + 2.0 * _BRAKING * shape.front)
-    return math.sqrt(float((squares + 2.0 * _BRAKING * to_front).min()))
+    squares = []
+    bounds = (
+        (route.start, route.speed_limits**2),
+        (route.start - shape.front, _SIDEWAYS / np.maximum(np.abs(route.curvatures), _STRAIGHT)),
+    )
+    for begin, bound in bounds:
+        ahead = slice(_row(route, begin), None)
+        way = np.maximum(route.line.stations[ahead] - begin, 0.0)
+        squares.append(float((bound[ahead] + 2.0 * _BRAKING * way).min()))
+    return math.sqrt(min(squares))
 
 
 def _row(route: Route, station: float) -> int:

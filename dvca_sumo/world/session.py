@@ -56,6 +56,7 @@ class Entry(msgspec.Struct, frozen=True):
     edges: tuple[str, ...]  # of its route, from the one it stands on
     lane: str
     position: float  # [m] of the front bumper along the lane
+    beside: float  # [m] and to the left of its centre
     stops: tuple[str, ...]  # its own, by stopping place or lane and position; as an ego it does not make them
     parameters: dict[str, str]  # the vehicle's own "dvca." parameters, without that prefix
 
@@ -161,6 +162,7 @@ class Session:
             edges=tuple(of.getRoute(vehicle)[of.getRouteIndex(vehicle) :]),
             lane=of.getLaneID(vehicle),
             position=of.getLanePosition(vehicle),
+            beside=of.getLateralLanePosition(vehicle),
             stops=tuple(stop.stoppingPlaceID or f"{stop.lane} at {stop.endPos:g} m" for stop in of.getStops(vehicle)),
             parameters={name: text for name, text in texts.items() if text},
         )
