@@ -91,7 +91,7 @@ def unsteerable(line: Polyline) -> npt.NDArray[np.bool_]:
 
 
 def swept(line: Polyline) -> tuple[Floats, Floats]:
-    """How far to the left and right of each point of the line [m] a car comes whose rear axle follows it: (n,), (n,)."""
+    """How far to the left and right of each point of the line [m] a car comes whose rear axle follows it; (n,) each."""
     stations = line.stations
     poses = line.poses(stations)
     left, right = np.full(len(stations), _HALF_WIDTH), np.full(len(stations), -_HALF_WIDTH)

@@ -121,4 +121,5 @@ class _Fleet:
             elif outcome.ending is not Ending.CUT:
                 how = TripOutcome(outcome.ending.value)
             reason = "" if error is None else str(error)
-            self._results.append(watch.result(how, outcome.judgements, reason, outcome.digest))
+            jam = next((name for name in watch.holding() if not self._world.is_stopping(name)), None)
+            self._results.append(watch.result(how, outcome.judgements, reason, outcome.digest, jam))

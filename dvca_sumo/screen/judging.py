@@ -5,7 +5,7 @@
    touched the flank of an ego that was in its lane and not on a junction. Then time to collision and distance to that
    same object just before are its doing, too. And a
    destination is not reached for the others' sake when SUMO's own driver on the same trip had not arrived after the
-   same time either.
+   same time either, or when it ends in a jam: see `jams`.
 3. Everything else is the driver's: the ego's own. Traffic rules are always the driver's.
 
 The ego is in its lane when no corner of its body is more than 0.3 m beyond the edges of the lane under its middle.
@@ -18,6 +18,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.boxes import box_of, corners
+from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.roadmap import Lane, RoadMap
 from dvca_sumo.screen.disturbances import Disturbances
 from dvca_sumo.truth import Moment
@@ -47,9 +48,16 @@ class Judged(msgspec.Struct, frozen=True):
 
 
 def judged(
-    judgements: Sequence[Judgement], disturbances: Disturbances, end: Moment, roadmap: RoadMap
+    judgements: Sequence[Judgement],
+    disturbances: Disturbances,
+    end: Moment,
+    roadmap: RoadMap,
+    jam: str | None = None,
 ) -> tuple[Judged, ...]:
-    """All violations of a drive by time, `end` being its last moment that was judged: its contact, if it has one."""
+    """All violations of a drive by time, `end` being its last moment that was judged: its contact, if it has one.
+
+    `jam` is who holds up the ego in a jam at that time.
+    """
     violations = [(judgement.kind, violation) for judgement in judgements for violation in judgement.violations]
     contact = next((one for _, one in violations if one.contact is not None), None)
     excuse = "" if contact is None else _excuse(contact, end, roadmap)
@@ -61,6 +69,8 @@ def judged(
             found.append(Judged(oracle, violation, Fault.SIMULATOR, reason))
         elif excuse and contact is not None and _belongs(violation, contact):
             found.append(Judged(oracle, violation, Fault.OTHER, excuse))
+        elif oracle == Destination.kind and jam is not None:
+            found.append(Judged(oracle, violation, Fault.OTHER, f"held up in a jam behind {jam}"))
         else:
             found.append(Judged(oracle, violation, Fault.DRIVER, ""))
     return tuple(sorted(found, key=lambda one: one.violation.time))

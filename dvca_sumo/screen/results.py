@@ -7,6 +7,7 @@ import msgspec
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.run import Judging
 from dvca_sumo.screen.disturbances import Disturbances
+from dvca_sumo.screen.jams import Jams
 from dvca_sumo.screen.judging import Judged, judged
 from dvca_sumo.screen.measures import Measures
 from dvca_sumo.truth import Moment
@@ -47,22 +48,33 @@ class Watch:
         self._roadmap = roadmap
         self._measures = Measures(judging.places, judging.thresholds)
         self._disturbances = Disturbances(judging.places)
-
+        self._jams = Jams(judging.places, roadmap)
         self._contact: Moment | None = None
 
     def see(self, moment: Moment) -> None:
         """Take in the next moment."""
         self._measures.see(moment)
         self._disturbances.see(moment)
+        self._jams.see(moment)
+
+    def holding(self) -> list[str]:
+        """Those who hold up the ego now in a jam, if they make no stops of their own."""
+        assert self._measures.last is not None
+        return self._jams.holding(self._measures.last)
 
     def touch(self, moment: Moment) -> None:
         """Take in the moment of the contact, of a drive that goes on after it."""
         self._contact = moment
 
     def result(
-        self, outcome: TripOutcome, judgements: tuple[Judgement, ...], reason: str = "", digest: str = ""
+        self,
+        outcome: TripOutcome,
+        judgements: tuple[Judgement, ...],
+        reason: str = "",
+        digest: str = "",
+        jam: str | None = None,
     ) -> TripResult:
-        """The trip, when it is over."""
+        """The trip, when it is over; `jam` is who holds up the ego in one."""
         measures, last = self._measures, self._measures.last
         assert last is not None  # a drive begins with a look around
         return TripResult(
@@ -74,7 +86,7 @@ class Watch:
             duration=round(measures.duration, 3),
             hard_brakings=measures.hard_brakings,
             least_ttc=measures.least_ttc,
-            violations=judged(judgements, self._disturbances, self._contact or last, self._roadmap),
+            violations=judged(judgements, self._disturbances, self._contact or last, self._roadmap, jam),
             unknown=tuple(one.kind for one in judgements if one.answer == "unknown"),
             digest=digest,
         )

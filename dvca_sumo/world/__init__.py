@@ -82,6 +82,10 @@ class World:
         """The class of a vehicle that is under way."""
         return self._session.class_of(vehicle)
 
+    def is_stopping(self, vehicle: str) -> bool:
+        """Whether a vehicle that is under way makes a stop of its own now, parks or waits for somebody."""
+        return self._session.is_stopping(vehicle)
+
     def entry(self, vehicle: str, settings: Sequence[str]) -> Entry:
         """How a vehicle that has just departed stands, and its "dvca." parameters among `settings`."""
         return self._session.entry(vehicle, settings)

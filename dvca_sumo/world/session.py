@@ -171,6 +171,10 @@ class Session:
         """The class of a vehicle that is in the simulation."""
         return str(libsumo.vehicle.getVehicleClass(vehicle))
 
+    def is_stopping(self, vehicle: str) -> bool:
+        """Whether a vehicle that is in the simulation makes a stop of its own."""
+        return bool(libsumo.vehicle.isStopped(vehicle))
+
     def motion(self, vehicle: str) -> Motion:
         """How a vehicle moves that SUMO drives."""
         of = libsumo.vehicle

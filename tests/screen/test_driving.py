@@ -1,8 +1,10 @@
 """Several egos in one simulation, and SUMO's own drivers before the same oracles."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import pytest
 from screen_scenes import HEAR, TRAFFIC, draw, drive, traffic
 from small_scenarios import driven as driven_alone
 from small_scenarios import in_child
@@ -11,6 +13,7 @@ from dvca_sumo.screen.anchor import anchored
 from dvca_sumo.screen.driving import driven
 from dvca_sumo.screen.judging import Fault
 from dvca_sumo.screen.results import TripOutcome
+from dvca_sumo.screen.trips import Trip
 from dvca_sumo.stack.sources import StackSource
 
 
@@ -85,3 +88,30 @@ def test_sumos_drivers_make_no_stops_that_the_ads_does_not_make(tmp_path: Path, 
     (ads,) = drive(scenario, ["stopping"]).results
     assert (sumo.outcome, ads.outcome) == (TripOutcome.ARRIVED, TripOutcome.ARRIVED)
     assert max(sumo.duration, ads.duration) < 100.0
+
+
+@pytest.mark.parametrize(
+    ("other", "stop", "fault"),
+    [
+        ('type="stuck"', "", Fault.OTHER),
+        ("", '<stop lane="we_0" endPos="200" duration="1000"/>', Fault.DRIVER),
+    ],
+    ids=["in a jam", "behind who stops there"],
+)
+def test_an_ego_held_up_in_a_jam_is_not_at_fault(
+    tmp_path: Path, plain_file: Callable[..., Path], other: str, stop: str, fault: Fault
+) -> None:
+    """SUMO's vehicles stand in jams that only a teleport ends; one that means to stand there is to be passed."""
+    net = plain_file(
+        '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/>', '<edge id="we" from="w" to="e" speed="13.9"/>'
+    )
+    routes = (
+        f'<vType id="stuck" maxSpeed="0.01"/><vehicle id="other" {other} depart="0" departPos="195">'
+        f'<route edges="we"/>{stop}</vehicle><trip id="ego" from="we" to="we" depart="1"/>'
+    )
+    scenario = traffic(tmp_path, net, routes, end="400")
+    found = in_child(partial(driven, scenario, StackSource(), [Trip("ego", 1.0, 395.0, 29.0, 40.0)], 1, HEAR))
+    (result,) = found.results
+    assert result.outcome is TripOutcome.TIME_OVER
+    assert [(one.violation.kind, one.fault) for one in result.violations] == [("destination_not_reached", fault)]
+    assert ("other" in result.violations[0].reason) == (fault is Fault.OTHER)
