@@ -14,7 +14,7 @@ from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.right_of_way import crossings, stop_line
 from dvca_sumo.roadmap.route import Route, RouteError, UnmappedLimit
 from dvca_sumo.roadmap.smoothing import smoothed, stepped
-from dvca_sumo.roadmap.steering import PART, WHOLE, steered, straying, swept, unsteerable
+from dvca_sumo.roadmap.steering import PART, WHOLE, steered, straying, unsteerable
 
 _BEFORE = 20.0  # [m] of lane shown behind the start, as far as there is any
 _RUN_UP = 10.0  # [m] of line behind the start in any case: the rear axle needs a line under it
@@ -55,7 +55,6 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
 
     followed = _followed(plan, along)
     edges_of = _bounds(net, plan, line, along)
-    leftmost, rightmost = swept(line)  # where no car could stay between the edges, they are as wide as one needs
     passages = [
         _Passage(passage.movement, moved(passage.begin), moved(passage.end))
         for passage in plan.passages
@@ -66,10 +65,10 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
         lane_ids=tuple(lane.id for lane in followed),
         speed_limits=_fixed(np.array([lane.speed_limit for lane in followed])),
         curvatures=line.curvatures,
-        lane_left=_fixed(np.maximum(edges_of.lane_left, leftmost)),
-        lane_right=_fixed(np.minimum(edges_of.lane_right, rightmost)),
-        road_left=_fixed(np.maximum(edges_of.road_left, leftmost)),
-        road_right=_fixed(np.minimum(edges_of.road_right, rightmost)),
+        lane_left=edges_of.lane_left,
+        lane_right=edges_of.lane_right,
+        road_left=edges_of.road_left,
+        road_right=edges_of.road_right,
         start=moved(plan.start),
         destination=moved(plan.destination),
         stop_lines=tuple(stop_line(net, p.movement, p.begin, p.end) for p in passages),

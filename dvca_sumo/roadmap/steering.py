@@ -90,28 +90,22 @@ def unsteerable(line: Polyline) -> npt.NDArray[np.bool_]:
     return sharp | (np.abs(ahead - behind) > 2.0 * _REVERSAL * _TOO_QUICK)
 
 
-def swept(line: Polyline) -> tuple[Floats, Floats]:
-    """How far to the left and right of each point of the line [m] a car comes whose rear axle follows it; (n,) each."""
-    stations = line.stations
-    poses = line.poses(stations)
-    left, right = np.full(len(stations), _HALF_WIDTH), np.full(len(stations), -_HALF_WIDTH)
+def straying(line: Polyline, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
+    """Which points are abreast of a corner that leaves its lane, of a car whose rear axle follows the line.
+
+    `left`, `right`: the lane's edges at each point of `line` [m].
+    """
+    stations, poses = line.stations, line.poses(line.stations)
+    out = np.zeros(len(stations), dtype=np.bool_)
     for ahead, side in _CORNERS:
         abreast = stations + ahead
         frames = line.poses(abreast)
         x = poses[:, 0] + ahead * np.cos(poses[:, 2]) - side * np.sin(poses[:, 2]) - frames[:, 0]
         y = poses[:, 1] + ahead * np.sin(poses[:, 2]) + side * np.cos(poses[:, 2]) - frames[:, 1]
         offsets = y * np.cos(frames[:, 2]) - x * np.sin(frames[:, 2])
-        after = np.minimum(stations.searchsorted(abreast), len(stations) - 1)
-        for rows in (after, np.maximum(after - 1, 0)):
-            np.maximum.at(left, rows, offsets)
-            np.minimum.at(right, rows, offsets)
-    return left, right
-
-
-def straying(line: Polyline, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
-    """Which points lie where a car whose rear axle follows the line leaves its lane, `left` to `right` of it [m]."""
-    leftmost, rightmost = swept(line)
-    return (leftmost > left + _STRAY) | (rightmost < right - _STRAY)
+        rows = np.minimum(stations.searchsorted(abreast), len(stations) - 1)
+        out[rows[(offsets > left[rows] + _STRAY) | (offsets < right[rows] - _STRAY)]] = True
+    return out
 
 
 def steered(
