@@ -1,20 +1,27 @@
-"""Time to collision: how soon the ego would touch an object if both kept their velocities."""
+"""Time to collision: how soon the ego would touch an object if both kept their velocities, and their turning too.
+
+Constant velocity, and constant turn rate and velocity: R. Schubert et al., Comparison and evaluation of advanced motion
+models for vehicle tracking (2008).
+"""
 
 import math
 
 import numpy as np
 import numpy.typing as npt
 
-from dvca_sumo.geometry.boxes import contact_times
+from dvca_sumo.geometry.angles import wrapped
+from dvca_sumo.geometry.boxes import box_of, contact_times, distances
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.oracles.ahead import ahead
 from dvca_sumo.oracles.findings import Findings
 from dvca_sumo.oracles.place import Places
 from dvca_sumo.thresholds import Thresholds
-from dvca_sumo.truth import Moment
+from dvca_sumo.truth import Moment, ObjectsTruth
 from dvca_sumo.violations import Category, Ending, Judgement, Violation
 
 Flags = npt.NDArray[np.bool_]
+
+_STEP = 0.05  # [s] between the places on their arcs where two are compared
 
 
 class TimeToCollision:
@@ -23,7 +30,8 @@ class TimeToCollision:
     The smaller of two times counts: straight on, when the moving boxes first touch (any object, any
     direction); along the route, the gap to an object in the ego's strip over the closing speed, which
     also holds in a curve. Not judged: a slow ego, objects wholly behind one that drives forwards (the
-    hazard is the follower's), and boxes that touch already (that is a collision).
+    hazard is the follower's), and boxes that touch already (that is a collision). Nor is a contact that
+    does not come about when both go on turning as they do: two cars that pass each other in a bend.
     """
 
     kind = "ttc"
@@ -36,16 +44,24 @@ class TimeToCollision:
         self._dwell = thresholds.ttc_dwell
         self._since: dict[str, float] = {}  # [s] by object id, of each contact that is near now
         self._reported: set[str] = set()
+        self._before: ObjectsTruth | None = None
 
     def observe(self, moment: Moment) -> Violation | None:
         """See `Oracle`."""
         self._places.at(moment)
+        before, self._before = self._before, moment.objects
         if abs(moment.ego.speed) < self._slowest:
             self._since = {}
             return self._findings.next()
-        rows, times = self.times(moment)
-        soon = {moment.objects.ids[row]: time for row, time in zip(rows.tolist(), times.tolist(), strict=True)}
-        since = {name: self._since.get(name, moment.time) for name, time in soon.items() if 0.0 < time < self._horizon}
+        rows, straight, along = self._times(moment)
+        names, horizon = moment.objects.ids, self._horizon
+        soon = {
+            names[row]: min(ahead_on, following)
+            for row, ahead_on, following in zip(rows.tolist(), straight.tolist(), along.tolist(), strict=True)
+            if min(ahead_on, following) > 0.0
+            and (following < horizon or (ahead_on < horizon and _meet_turning(moment, row, before, horizon)))
+        }
+        since = {name: self._since.get(name, moment.time) for name in soon}
         for name, begun in since.items():
             if moment.time - begun >= self._dwell - 1e-9 and name not in self._reported:
                 self._reported.add(name)
@@ -60,34 +76,65 @@ class TimeToCollision:
 
     def times(self, moment: Moment) -> tuple[Integers, Floats]:
         """Rows of the objects in reach, and the time to contact [s] of each; inf if beyond the threshold."""
+        rows, straight, along = self._times(moment)
+        return rows, np.minimum(straight, along)
+
+    def _times(self, moment: Moment) -> tuple[Integers, Floats, Floats]:
+        """Rows of the objects in reach, and the times to contact of each straight on and along the route [s]."""
         ego, objects, box = moment.ego, moment.objects, self._places.at(moment).box
         velocity = np.array([ego.speed * math.cos(ego.heading), ego.speed * math.sin(ego.heading)])
         relative = np.hypot(objects.velocities[:, 0] - velocity[0], objects.velocities[:, 1] - velocity[1])
         # Along a bend the gap may close although the velocities are equal.
         rows = self._places.within(moment, np.maximum(relative, abs(ego.speed)) * self._horizon)
-        if rows.size == 0:
-            return rows, np.empty(0)
         fronts = _foremost(box, objects.boxes[rows])
         # What lies wholly behind closes in by its own doing.
         if ego.speed > 0.0:
             is_beside = fronts >= -0.5 * box[3]
             rows, fronts = rows[is_beside], fronts[is_beside]
-            if rows.size == 0:
-                return rows, np.empty(0)
-        times = contact_times(box, velocity, objects.boxes[rows], objects.velocities[rows], self._horizon)
+        along = np.full(len(rows), math.inf)
+        if rows.size == 0:
+            return rows, along, along
         is_leader = fronts > 0.5 * box[3]
         if ego.speed > 0.0 and is_leader.any():
-            self._shorten_along_route(moment, rows, is_leader, times)
-        return rows, times
+            self._follow_route(moment, rows, is_leader, along)
+        return rows, contact_times(box, velocity, objects.boxes[rows], objects.velocities[rows], self._horizon), along
 
-    def _shorten_along_route(self, moment: Moment, rows: Integers, is_leader: Flags, times: Floats) -> None:
-        """Put the following time where it is the smaller one."""
+    def _follow_route(self, moment: Moment, rows: Integers, is_leader: Flags, times: Floats) -> None:
+        """Put the following times of leaders where they are."""
         speed = moment.ego.speed
         leaders = ahead(self._places, moment, speed * self._horizon, rows=rows[is_leader])
         closing = speed - leaders.speeds
         is_closing = (closing > 0.0) & (leaders.speeds >= 0.0)
-        found = rows.searchsorted(leaders.rows[is_closing])
-        times[found] = np.minimum(times[found], leaders.gaps[is_closing] / closing[is_closing])
+        times[rows.searchsorted(leaders.rows[is_closing])] = leaders.gaps[is_closing] / closing[is_closing]
+
+
+def _meet_turning(moment: Moment, row: int, before: ObjectsTruth | None, horizon: float) -> bool:
+    """Whether ego and object touch within `horizon` [s] when both go on turning as they did since `before`."""
+    ego, objects = moment.ego, moment.objects
+    x, y, heading, *_ = objects.boxes[row].tolist()
+    rate = 0.0
+    if before is not None and moment.time > before.time and objects.ids[row] in before.ids:
+        known = before.boxes[before.ids.index(objects.ids[row]), 2]
+        rate = wrapped(heading - float(known)) / (moment.time - before.time)
+    speed, course = (
+        math.hypot(*objects.velocities[row]),
+        math.atan2(objects.velocities[row, 1], objects.velocities[row, 0]),
+    )
+    boxes = objects.boxes[[row]]
+    for time in np.arange(_STEP, horizon + _STEP, _STEP).tolist():
+        place = _moved(ego.x, ego.y, ego.speed, ego.heading, ego.yaw_rate, time)
+        boxes[0, :2] = _moved(x, y, speed, course, rate, time)
+        boxes[0, 2] = heading + rate * time
+        if distances(box_of(*place, ego.heading + ego.yaw_rate * time, moment.shape), boxes)[0] <= 0.0:
+            return True
+    return False
+
+
+def _moved(x: float, y: float, speed: float, course: float, rate: float, time: float) -> tuple[float, float]:
+    """Where a point is after `time` [s] on its arc: at the end of a chord."""
+    half = 0.5 * rate * time
+    chord = speed * time * (math.sin(half) / half if half else 1.0)
+    return x + chord * math.cos(course + half), y + chord * math.sin(course + half)
 
 
 def _foremost(box: Floats, boxes: Floats) -> Floats:

@@ -107,3 +107,16 @@ def test_the_threshold_is_a_parameter() -> None:
 
 def test_nothing_is_known_of_a_run_without_moments() -> None:
     assert judged(TimeToCollision, []).answer is Answer.UNKNOWN
+
+
+@pytest.mark.parametrize(("turn_rate", "expected"), [(0.0, Answer.VIOLATED), (-1.0, Answer.KEPT)])
+def test_two_cars_that_turn_past_each_other_are_no_hazard(turn_rate: float, expected: Answer) -> None:
+    """The oncoming car points at the ego, but turns: in half a second it is past it."""
+    moments = []
+    for step in range(4):
+        time = 0.1 * step
+        course = math.pi + 0.35 + turn_rate * (time - 0.2)
+        velocity = (6.0 * math.cos(course), 6.0 * math.sin(course))
+        oncoming: Row = ("oncoming", (56.5 - 0.2 * step, 2.9, course, 4.6, 1.8), velocity)
+        moments.append(moment(time, 50.0, 3.0, objects=[oncoming]))
+    assert judged(TimeToCollision, moments).answer is expected
