@@ -7,9 +7,10 @@ from dvca_sumo.roadmap import Route
 from dvca_sumo.scenario import AUTO, Scenario, ScenarioError
 from dvca_sumo.truth import Moment
 from dvca_sumo.world.bodies import Ego, Native, shape_of
+from dvca_sumo.world.entry import Entry
 from dvca_sumo.world.levels import on_level
 from dvca_sumo.world.obstacles import joined
-from dvca_sumo.world.session import Entry, Session
+from dvca_sumo.world.session import Session
 from dvca_sumo.world.vehicle import ControlCommandError, Vehicle, VehicleLimits
 
 __all__ = ["CARS", "ControlCommandError", "Ego", "Entry", "Native", "Vehicle", "VehicleLimits", "World", "shape_of"]

@@ -2,19 +2,16 @@
 
 import math
 
-import numpy as np
-
 from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.messages import VehicleShape
 from dvca_sumo.roadmap import Route
 from dvca_sumo.truth import EgoTruth
-from dvca_sumo.world.session import Entry, Motion
+from dvca_sumo.world.entry import Entry, departure, row_at
+from dvca_sumo.world.session import Motion
 from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
 
 _SEARCHED = 10.0  # [m] along the route: nobody gets farther in a world step, and a route may come by again soon
 _INDICATED = 50.0  # [m] before a junction an ego that turns at it begins to indicate
-_SIDEWAYS, _BRAKING = 2.0, 2.0  # [m/s^2] in curves and before them, of careful drivers
-_STRAIGHT = 1e-4  # [1/m]
 # By a movement's direction; T: about, in left-hand traffic.
 _SIDES = {"l": 1, "L": 1, "t": 1, "r": -1, "R": -1, "T": -1}
 
@@ -32,7 +29,7 @@ class Ego:
         self.stops = entry.stops
         self.route = route
         self.shape = shape_of(entry)
-        self.vehicle = Vehicle(self.shape, limits, _departure(entry, route, self.shape))
+        self.vehicle = Vehicle(self.shape, limits, departure(entry, route, self.shape))
         self.signals = _signals(route)  # ids of the signal heads on its route
         self._turns = _turns(route)
         self._way = _Way(route, self.shape)
@@ -52,7 +49,7 @@ class Ego:
         front = min(self.station() + self.shape.front, line.length)
         change = self.route.lane_change_at(front)
         if change is None:
-            return self.route.lane_ids[_row(self.route, front)]
+            return self.route.lane_ids[row_at(self.route, front)]
         truth, reach = self.vehicle.truth, self.shape.front
         nose = (truth.x + reach * math.cos(truth.heading), truth.y + reach * math.sin(truth.heading))
         _, offsets = line.project([nose], between=(front - reach, front + reach))
@@ -124,43 +121,6 @@ class _Way:
             self._station = self._line.station(truth.x, truth.y, between=window)
             self._time = truth.time
         return self._station
-
-
-def _departure(entry: Entry, route: Route, shape: VehicleShape) -> EgoTruth:
-    """An ego on its way along the route, as far beside it as SUMO set it down beside its lane.
-
-    SUMO turns who departs at the begin of a lane towards a lane before it, whichever that is, and a route does not
-    always keep to the middle of a lane: an ego at speed would have to swerve.
-    """
-    axle = route.start - shape.front
-    x, y, heading = route.line.poses([axle], entry.beside)[0].tolist()
-    speed = min(entry.speed, _fastest(route, shape))
-    curvature = float(np.interp(axle, route.line.stations, route.curvatures))
-    return EgoTruth(
-        entry.time, x, y, wrapped(heading), speed, 0.0, speed * curvature, math.atan(shape.wheelbase * curvature)
-    )
-
-
-def _fastest(route: Route, shape: VehicleShape) -> float:
-    """How fast a careful driver would come to where the route begins [m/s].
-
-    SUMO's drivers may depart faster than the law allows, or than the next curve: that would not be the ADS's doing.
-    """
-    squares = []
-    bounds = (
-        (route.start, route.speed_limits**2),
-        (route.start - shape.front, _SIDEWAYS / np.maximum(np.abs(route.curvatures), _STRAIGHT)),
-    )
-    for begin, bound in bounds:
-        ahead = slice(_row(route, begin), None)
-        way = np.maximum(route.line.stations[ahead] - begin, 0.0)
-        squares.append(float((bound[ahead] + 2.0 * _BRAKING * way).min()))
-    return math.sqrt(min(squares))
-
-
-def _row(route: Route, station: float) -> int:
-    """The row of the route's arrays that holds at a station within it."""
-    return int(route.line.stations.searchsorted(station, side="right")) - 1
 
 
 def _turns(route: Route) -> tuple[tuple[float, float, int], ...]:

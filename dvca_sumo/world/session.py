@@ -22,6 +22,7 @@ from dvca_sumo.messages import ObjectClass, SignalColour
 from dvca_sumo.scenario import Scenario, ScenarioError, silenced
 from dvca_sumo.truth import EgoTruth, ObjectsTruth
 from dvca_sumo.world.crowd import Body, Crowd
+from dvca_sumo.world.entry import Entry
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 from dvca_sumo.world.signals import Signals
 
@@ -39,26 +40,6 @@ _INDICATORS = {1: 0b10, 0: 0, -1: 0b1}  # by the side they tell; bits of SUMO's 
 _BRAKE_LIGHT = 0b1000
 _STANDING = 0.1  # [m/s] up to which SUMO's vehicles show their brake lights
 _TWO_WHEELED = ("bicycle", "moped", "motorcycle", "scooter")
-
-
-class Entry(msgspec.Struct, frozen=True):
-    """How the ego enters the simulation."""
-
-    ego: str
-    time: float  # [s]
-    front_x: float  # [m]
-    front_y: float  # [m]
-    heading: float  # [rad]
-    speed: float  # [m/s]
-    length: float  # [m]
-    width: float  # [m]
-    vehicle_class: str
-    edges: tuple[str, ...]  # of its route, from the one it stands on
-    lane: str
-    position: float  # [m] of the front bumper along the lane
-    beside: float  # [m] and to the left of its centre
-    stops: tuple[str, ...]  # its own, by stopping place or lane and position; as an ego it does not make them
-    parameters: dict[str, str]  # the vehicle's own "dvca." parameters, without that prefix
 
 
 class Motion(msgspec.Struct, frozen=True):

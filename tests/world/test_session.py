@@ -154,17 +154,8 @@ def test_pois_and_polygons_are_bodies_when_their_type_says_so(tmp_path: Path, st
 
 
 def test_signals_show_their_colour_for_the_egos_movement(tmp_path: Path, street: Path) -> None:
-    shown = {
-        "r": SignalColour.RED,
-        "u": SignalColour.RED,
-        "y": SignalColour.YELLOW,
-        "Y": SignalColour.YELLOW,
-        "G": SignalColour.GREEN,
-        "g": SignalColour.PERMISSIVE,
-        "s": SignalColour.PERMISSIVE,
-        "o": SignalColour.OFF,
-        "O": SignalColour.OFF,
-    }
+    red, yellow, green, permissive, off = list(SignalColour)
+    shown = dict(zip("ruyYGgsoO", (red, red, yellow, yellow, green, permissive, permissive, off, off), strict=True))
     phases = "".join(f'<phase duration="1" state="{letter * 20}"/>' for letter in shown)
     light = f'<tlLogic id="b" programID="all" type="static">{phases}</tlLogic>'
     ego = STANDING.replace('from="bc"', 'from="ab"')
