@@ -8,7 +8,8 @@ from soundness import check_sound
 
 from dvca_sumo.geometry.polyline import Floats, Polyline
 from dvca_sumo.roadmap import RoadMap
-from dvca_sumo.roadmap.steering import WHOLE, steered, unsteerable
+from dvca_sumo.roadmap.smoothing import smoothed
+from dvca_sumo.roadmap.steering import PART, WHOLE, steered, straying, unsteerable
 
 NetBuilder = Callable[..., RoadMap]
 
@@ -110,3 +111,27 @@ def test_turn_back_uses_both_lanes_of_the_road(grid: NetBuilder) -> None:
     _, before = roadmap.lanes["A1B1_1"].line.project(route.line.points[: int(route.stop_lines[0].station)])
     assert before.min() < -1.0  # towards lane 0, before it turns left
     assert before.max() < 2.0
+
+
+def beyond(line: Polyline, drawn: Polyline, half: float) -> float:
+    """How far a corner comes beyond a lane so wide on each side of `line` [m]."""
+    found = swept(line, drawn)
+    inner = (found[:, 0] > 1.0) & (found[:, 0] < line.length - 1.0)
+    return float(np.abs(found[inner, 1]).max()) - half
+
+
+@pytest.mark.parametrize("angle", [0.35 * np.pi, 0.5 * np.pi, 0.7 * np.pi])
+@pytest.mark.parametrize("radius", [7.0, 7.5])
+def test_a_turn_that_can_be_steered_is_drawn_so_that_the_body_stays_in_its_lane(radius: float, angle: float) -> None:
+    line, half = Polyline(smoothed(corner(radius, angle))[0]), 1.6
+    assert not unsteerable(line).any()
+    out = straying(line, *room(line, half))
+    drawn = Polyline(steered(line, out, *room(line, half), PART)[0])
+    assert beyond(line, line, half) > 0.25
+    assert beyond(line, drawn, half) < 0.0
+    assert sharpest(drawn) < SHARPEST
+
+
+def test_a_wide_turn_is_left_as_it_is() -> None:
+    line = corner(25.0, 0.5 * np.pi)
+    assert not straying(line, *room(line, 1.6)).any()

@@ -1,7 +1,9 @@
 """The path between bounds that standing objects move in."""
 
+import math
+
 import pytest
-from planned_drives import Actor, assert_drivable, cone, drive, road
+from planned_drives import Actor, assert_drivable, car, cone, curve_points, drive, road
 
 from dvca_sumo.stack.bugs import build_with
 from dvca_sumo.stack.reference import StackConfig
@@ -42,3 +44,13 @@ def test_a_gap_narrower_than_the_ego_is_stopped_at_without_any_buffer() -> None:
     driven = drive(road(), 20.0, speed=12.0, actors=gate)
     assert driven.speeds[-1] == 0.0
     assert driven.fronts[-1] < 116.0
+
+
+def test_ends_of_a_long_vehicle_inside_a_bend_are_not_driven_into() -> None:
+    """Its middle leaves room beside the bend's line; its ends, straight on, do not."""
+    route = road(curve_points(20.0))
+    middle = 100.0 + 5.0 + 0.25 * math.pi * 20.0
+    x, y, heading = route.line.poses([middle], 0.9 + 0.6 + 1.25)[0].tolist()
+    driven = drive(route, 40.0, speed=8.0, actors=[car(7, x, y, heading=heading, size=(12.0, 2.5))])
+    assert driven.clearances.min() > 0.2
+    assert_drivable(driven)
