@@ -82,7 +82,7 @@ class NudgeDecider:
         self._driven.update(scene.ids[row] for row in (~scene.is_standing).nonzero()[0].tolist())
         self._since = {track: self._since.get(track, situation.time) for track in standing}
         nudges = []
-        for blocker in self._blockers(scene, situation.window) if standing else ():
+        for blocker in self._blockers(scene, situation.window) if standing or self._held else ():
             offset = self._offset(blocker, situation)
             if offset is not None:
                 nudges.append(Nudge(blocker.track, self._plateau(blocker, offset, situation)))
@@ -105,11 +105,16 @@ class NudgeDecider:
         return Plateau(begin, max(end, begin), offset)
 
     def _blockers(self, scene: Scene, window: Window) -> list[_Blocker]:
-        """Standing objects that the ego, centred in its lane, would pass with less than the wanted clearance."""
+        """Objects that the ego, centred in its lane, would pass with less than the wanted clearance.
+
+        They stand; who starts to move while the ego is beside them is passed all the same, or passes the ego.
+        """
         now, config = scene.now, self._config
         wanted = np.where(scene.classes == _PERSON, config.person_clearance, config.nudge_clearance)
-        wanted_now = wanted + [config.nudge_hold if track in self._held else 0.0 for track in scene.ids]
-        near = scene.is_standing & (np.abs(now.offsets) < self._half + wanted_now + now.half_widths)
+        is_held = np.array([track in self._held for track in scene.ids], dtype=np.bool_)
+        is_beside = is_held & (now.stations - now.half_lengths < self._shape.front + _ALONG)
+        near = np.abs(now.offsets) < self._half + wanted + config.nudge_hold * is_held + now.half_widths
+        near &= scene.is_standing | is_beside
         near &= now.stations + now.half_lengths > -self._shape.rear_overhang - _ALONG
         near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
         blockers = [
@@ -171,8 +176,12 @@ class NudgeDecider:
         return bool((alongside & (np.abs(now.offsets - offset) < reach)).any())
 
     def _may_leave_lane(self, blocker: _Blocker, offset: float, situation: Situation) -> bool:
-        """For what will not move by itself, when the other lane is free; always to finish what was begun."""
-        if blocker.track in self._held and situation.lateral.offset / offset > _COMMITTED:
+        """For what will not move by itself, when the other lane is free; always to finish what was begun.
+
+        Also beside who has started to move.
+        """
+        is_committed = blocker.track not in self._since or situation.lateral.offset / offset > _COMMITTED
+        if blocker.track in self._held and is_committed:
             return True
         if situation.scene.classes[blocker.row] != _STATIC:
             stood = situation.time - self._since[blocker.track]

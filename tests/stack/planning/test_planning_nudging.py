@@ -137,3 +137,13 @@ def test_person_who_stands_in_the_lane_is_passed_with_more_clearance() -> None:
     driven = drive(road(lanes_left=1), 40.0, speed=8.0, actors=[person(5, 80.0, -0.8)])
     assert driven.fronts[-1] > 100.0
     assert driven.clearances.min() > 1.0
+
+
+@pytest.mark.parametrize("leaves", [18.0, 19.0, 20.0, 21.0])
+def test_a_bus_that_starts_while_it_is_passed_is_not_cut_off(leaves: float) -> None:
+    bus = car(4, 100.0, size=(12.0, 2.5), speed=4.5, leaves=leaves)
+    driven = drive(road(lanes_left=1, limit=5.0), 35.0, speed=5.0, actors=[bus])
+    at_start = driven.fronts[round(10.0 * leaves)]
+    assert 94.0 < at_start < 115.0
+    assert driven.clearances.min() > 0.4
+    assert_drivable(driven)
