@@ -2,7 +2,7 @@
 
 Lanes whose centre lines cross do not meet where their edges share no junction. Lines of a net that are drawn
 carelessly cross too, close to the ends of their lanes or at a small angle, and lanes of two junctions that lie close
-together: these do not count.
+together: these do not count. Nor do paths: people cross roads where a net has no junction.
 """
 
 import math
@@ -51,6 +51,8 @@ class Levels:
         own = lines[self._rows[lane.id]]
         for row in sorted(self._tree.query(own, predicate="crosses").tolist()):
             other = self._lanes[row]
+            if not other.is_drivable:
+                continue
             if (lane.is_internal and other.is_internal) or self._junctions[lane.edge] & self._junctions[other.edge]:
                 continue
             for x, y in shapely.get_coordinates(shapely.intersection(own, lines[row])).tolist():

@@ -47,6 +47,12 @@ def test_lines_drawn_carelessly_are_no_bridges(plain: NetBuilder, x: float, angl
     assert not plain(*crossed(x, angle=angle)).route(["we"], "we_0", 50.0, None, 390.0).overpasses
 
 
+def test_a_path_across_the_road_is_no_bridge(plain: NetBuilder) -> None:
+    nodes, edges = crossed(200.0)
+    path = edges.replace('numLanes="2"', 'allow="pedestrian bicycle"')
+    assert not plain(nodes, path).route(["we"], "we_0", 50.0, None, 390.0).overpasses
+
+
 def test_roads_that_meet_at_a_junction_are_on_one_level(grid: NetBuilder) -> None:
     roadmap = grid()
     route = roadmap.route(["A1B1", "B1C1"], "A1B1_0", 20.0, None, 100.0)
