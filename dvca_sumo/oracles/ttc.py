@@ -116,10 +116,8 @@ def _meet_turning(moment: Moment, row: int, before: ObjectsTruth | None, horizon
     if before is not None and moment.time > before.time and objects.ids[row] in before.ids:
         known = before.boxes[before.ids.index(objects.ids[row]), 2]
         rate = wrapped(heading - float(known)) / (moment.time - before.time)
-    speed, course = (
-        math.hypot(*objects.velocities[row]),
-        math.atan2(objects.velocities[row, 1], objects.velocities[row, 0]),
-    )
+    east, north = objects.velocities[row].tolist()
+    speed, course = math.hypot(east, north), math.atan2(north, east)
     boxes = objects.boxes[[row]]
     for time in np.arange(_STEP, horizon + _STEP, _STEP).tolist():
         place = _moved(ego.x, ego.y, ego.speed, ego.heading, ego.yaw_rate, time)

@@ -14,6 +14,7 @@ import shapely
 from dvca_sumo.roadmap.lanes import Lane
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.route import Overpass, Route
+from dvca_sumo.roadmap.runs import runs
 
 _INSIDE = 5.0  # [m] from the ends of a lane that is crossed, but for the short ones on junctions
 _ANGLE = 0.25  # [rad] at least between lanes that cross
@@ -39,9 +40,9 @@ class Levels:
         """By station, then lane."""
         found = [
             Overpass(lane.id, station, (x, y))
-            for part, begin, end in _parts(route)
+            for part, rows in runs(route.lane_ids)
             for lane, x, y in self._crossed(self._lanes[self._rows[part]])
-            for station in _stations(route, (x, y), begin, end)
+            for station in _stations(route, (x, y), rows)
         ]
         return tuple(sorted(found, key=lambda one: (one.station, one.lane)))
 
@@ -60,19 +61,10 @@ class Levels:
                     yield other, x, y
 
 
-def _parts(route: Route) -> Iterator[tuple[str, float, float]]:
-    """Each lane that the route follows, between two stations [m]."""
-    names, stations = route.lane_ids, route.line.stations
-    begin = 0
-    for row in range(1, len(names) + 1):
-        if row == len(names) or names[row] != names[begin]:
-            yield names[begin], float(stations[begin]), float(stations[row - 1])
-            begin = row
-
-
-def _stations(route: Route, position: tuple[float, float], begin: float, end: float) -> Iterator[float]:
-    """The station abreast of a position between two stations [m], if there is one."""
-    stations, offsets = route.line.project([position], between=(begin - _SLACK, end + _SLACK))
+def _stations(route: Route, position: tuple[float, float], rows: slice) -> Iterator[float]:
+    """The station [m] abreast of a position along some rows of the route, if there is one."""
+    first, last = route.line.stations[[rows.start, rows.stop - 1]].tolist()
+    stations, offsets = route.line.project([position], between=(first - _SLACK, last + _SLACK))
     if abs(float(offsets[0])) <= _BESIDE:
         yield float(stations[0])
 

@@ -13,6 +13,7 @@ from dvca_sumo.roadmap.lanes import Lane, Movement
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.right_of_way import crossings, stop_line
 from dvca_sumo.roadmap.route import Route, RouteError, UnmappedLimit
+from dvca_sumo.roadmap.runs import runs
 from dvca_sumo.roadmap.smoothing import smoothed, stepped
 from dvca_sumo.roadmap.steering import PART, WHOLE, steered, straying, unsteerable
 
@@ -75,7 +76,7 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
         crossings=tuple(crossing for p in passages for crossing in crossings(net, p.movement, line, p.begin, p.end)),
         unmapped_limits=tuple(
             UnmappedLimit(float(line.stations[rows.start]), float(line.stations[rows.stop - 1]), lane.is_motorway)
-            for lane, rows in _runs(followed)
+            for lane, rows in runs(followed)
             if not lane.is_limit_mapped
         ),
         lane_changes=tuple(
@@ -174,7 +175,7 @@ def _steerable(net: NetContents, plan: _Plan, points: Floats, along: Floats, beg
 
 def _bounds(net: NetContents, plan: _Plan, line: Polyline, along: Floats) -> Bounds:
     """The edges along a line whose points lie `along` the rough one [m]."""
-    return bounds(net.lanes, line, list(_runs(_followed(plan, along))), _changes(plan, line, along))
+    return bounds(net.lanes, line, list(runs(_followed(plan, along))), _changes(plan, line, along))
 
 
 def _changes(plan: _Plan, line: Polyline, along: Floats) -> list[Change]:
@@ -206,15 +207,6 @@ def _clipped(line: Polyline, begin: float, end: float) -> Polyline:
     """The part of `line` between two stations [m]; it goes on straight beyond the line's ends."""
     inner = line.stations[(line.stations > begin) & (line.stations < end)]
     return Polyline(line.poses(np.concatenate(([begin], inner, [end])))[:, :2])
-
-
-def _runs(followed: Sequence[Lane]) -> Iterator[tuple[Lane, slice]]:
-    """Each lane with the rows along which it is followed."""
-    begin = 0
-    for row in range(1, len(followed) + 1):
-        if row == len(followed) or followed[row] is not followed[begin]:
-            yield followed[begin], slice(begin, row)
-            begin = row
 
 
 def _fixed(array: Floats) -> Floats:

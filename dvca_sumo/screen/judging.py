@@ -3,9 +3,8 @@
 1. The simulator's: see `disturbances`.
 2. The other one's: it ran into the standing ego; it ran into the ego from behind while the ego was in its lane; it
    touched the flank of an ego that was in its lane and not on a junction. Then time to collision and distance to that
-   same object just before are its doing, too. And a
-   destination is not reached for the others' sake when SUMO's own driver on the same trip had not arrived after the
-   same time either, or when it ends in a jam: see `jams`.
+   same object just before are its doing, too. And a destination is not reached for the others' sake when SUMO's own
+   driver on the same trip had not arrived after the same time either, or when it ends in a jam: see `jams`.
 3. Everything else is the driver's: the ego's own. Traffic rules are always the driver's.
 
 The ego is in its lane when no corner of its body is more than 0.3 m beyond the edges of the lane under its middle.

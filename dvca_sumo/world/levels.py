@@ -1,6 +1,7 @@
 """Bodies on bridges over an ego, and under those that it drives on: it does not meet them."""
 
 import math
+from collections import defaultdict
 
 import numpy as np
 
@@ -13,11 +14,16 @@ _AROUND = 200.0  # [m] along the route: it may come by again on the other level
 
 def on_level(objects: ObjectsTruth, route: Route, station: float) -> ObjectsTruth:
     """The objects without those that are on another level than an ego at `station` [m] of its route."""
-    places = {one.lane: one.position for one in route.overpasses if abs(one.station - station) <= _AROUND}
+    near = [one for one in route.overpasses if abs(one.station - station) <= _AROUND]
+    if not near:
+        return objects
+    places = defaultdict(list)
+    for one in near:
+        places[one.lane].append(one.position)
     there = [
         row
-        for row, lane in enumerate(objects.lanes if places else ())
-        if lane in places and math.dist(places[lane], objects.boxes[row, :2].tolist()) <= _BRIDGE
+        for row, lane in enumerate(objects.lanes)
+        if any(math.dist(place, objects.boxes[row, :2].tolist()) <= _BRIDGE for place in places.get(lane, ()))
     ]
     if not there:
         return objects

@@ -176,10 +176,7 @@ class NudgeDecider:
         return bool((alongside & (np.abs(now.offsets - offset) < reach)).any())
 
     def _may_leave_lane(self, blocker: _Blocker, offset: float, situation: Situation) -> bool:
-        """For what will not move by itself, when the other lane is free; always to finish what was begun.
-
-        Also beside who has started to move.
-        """
+        """For what will not move by itself, when the other lane is free; always to finish what was begun."""
         is_committed = blocker.track not in self._since or situation.lateral.offset / offset > _COMMITTED
         if blocker.track in self._held and is_committed:
             return True
