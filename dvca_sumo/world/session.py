@@ -23,6 +23,7 @@ from dvca_sumo.scenario import Scenario, ScenarioError, silenced
 from dvca_sumo.truth import EgoTruth, ObjectsTruth
 from dvca_sumo.world.crowd import Body, Crowd
 from dvca_sumo.world.entry import Entry
+from dvca_sumo.world.itinerary import Itinerary
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 from dvca_sumo.world.signals import Signals
 
@@ -79,6 +80,8 @@ class Session:
             raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {_in_one_line(error)}") from None
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
+        self._itineraries: dict[str, Itinerary] = {}  # by ego
+        self._routes: dict[str, str] = {}  # by ego, SUMO's name of its route
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
 
     @property
@@ -181,6 +184,8 @@ class Session:
         of.setWidth(entry.ego, entry.width)
         of.setVehicleClass(entry.ego, entry.vehicle_class)
         of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
+        self._itineraries[entry.ego] = Itinerary(entry.edges)
+        self._routes[entry.ego] = of.getRouteID(entry.ego)
         self.watch(entry.ego, radius)
 
     def skip_stops(self, vehicle: str) -> None:
@@ -220,6 +225,9 @@ class Session:
         x = truth.x + front * math.cos(truth.heading)
         y = truth.y + front * math.sin(truth.heading)
         angle = 90.0 - math.degrees(truth.heading)
+        self._itineraries[ego].reach(edge)
+        if libsumo.vehicle.getRouteID(ego) != self._routes[ego]:
+            self._remind(ego)
         libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, angle, keepRoute=2, matchThreshold=_MATCHED_WITHIN)
         # SUMO derives a wrong speed on junction and opposite lanes; drivers behind must react to the true one.
         libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
@@ -278,6 +286,18 @@ class Session:
     def close(self) -> None:
         """End the simulation; the process may start another."""
         libsumo.close()
+
+    def _remind(self, ego: str) -> None:
+        """Tell SUMO the rest of an ego's trip again, as soon as it sees it on the way."""
+        of = libsumo.vehicle
+        lane, row = of.getLaneID(ego), of.getRouteIndex(ego)
+        if not lane:
+            return  # it is beside the road
+        is_between = lane.startswith(":")
+        onward = self._itineraries[ego].onward(of.getRoute(ego)[row : row + 1 + is_between])
+        if onward:
+            of.setRoute(ego, onward)
+            self._routes[ego] = of.getRouteID(ego)
 
     def _vehicle(self, name: str) -> str:
         """The key of a vehicle among the bodies."""
