@@ -39,7 +39,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     # Distances kept sideways, from the side of the body.
     object_margin: float = 0.3  # [m] closer than this counts as in the way
     bicycle_margin: float = 0.6  # [m] bicycles sway
-    person_margin: float = 0.5  # [m] of people who stand or walk along the road
+    person_margin: float = 0.35  # [m] of people who stand or walk along the road
     crossing_person_margin: float = 1.0  # [m] of people who walk across
     crossing_margin: float = 2.0  # [m] of people who walk across at a pedestrian crossing
     person_slow_gap: float = 1.5  # [m] slow down when passing people closer than this
@@ -50,15 +50,16 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     # Nudging: going around what stands, within the lanes of our direction.
     nudge_clearance: float = 0.7  # [m] wanted sideways
-    nudge_clearance_least: float = 0.4  # [m] accepted where the road is narrow; more than `object_margin`
+    nudge_clearance_least: float = 0.4  # [m] accepted where the road is narrow; more than what counts as in the way
     person_clearance: float = 1.2  # [m] wanted beside people
     edge_clearance: float = 0.2  # [m] to the edge of the road
     nudge_hold: float = 0.15  # [m] smaller changes of a target are taken for noise
     standing_speed: float = 0.5  # [m/s] slower than this is standing: above the noise of a tracker
     moving_speed: float = 1.0  # [m/s] a vehicle that has stood counts as moving from here: the noise is on both sides
     parked_after: float = 3.0  # [s] of standing before the ego leaves its lane for a vehicle or person
-    broken_down_after: float = 120.0  # [s] of standing in the lane, if it was seen driving before
+    broken_down_after: float = 120.0  # [s] of standing in the lane, if it may be in a queue
     queue_reach: float = 30.0  # [m] before a stop line, a vehicle that stands may be waiting
+    queue_length: float = 100.0  # [m] before a stop line, a vehicle that stands may be behind others that it hides
     queue_gap: float = 12.0  # [m] to the next vehicle ahead, a vehicle that stands may be waiting
 
     # Changing lanes for the route.

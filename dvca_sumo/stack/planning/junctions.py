@@ -13,6 +13,7 @@ _OVERRUN = 0.5  # [m] the front bumper may be past a line and still wait at it
 _STANDING = 0.2  # [m/s]
 _AT_LINE = 4.0  # [m] before the line, where standing counts as having stopped at it
 _ROLLING = 2.0  # [m/s] below this speed the ego always manages to stop at a red light
+_NOBODY: frozenset[str] = frozenset()
 _MERGE_REACH = 10.0  # [m] past the junction, where traffic from other approaches still joins
 
 
@@ -22,7 +23,7 @@ class LineView(NamedTuple):
     line: StopLine
     distance: float  # [m] from the front bumper
     stop: str | None  # why the ego must not cross it, if it must not
-    gives_way: bool  # whether `line.yields_to` have priority
+    goes_first: frozenset[str]  # lanes whose traffic has priority
 
 
 class Junctions:
@@ -67,12 +68,12 @@ class Junctions:
     def _view(self, index: int, distance: float, time: float, speed: float) -> LineView:
         line = self._lines[index]
         if line.control is Control.SIGNAL:
-            stop, gives_way = self._at_signal(index, distance, time, speed)
+            stop, goes_first = self._at_signal(index, distance, time, speed)
         else:
-            stop, gives_way = None, True
+            stop, goes_first = None, line.yields_to
             if line.control in (Control.STOP, Control.ALL_WAY_STOP) and index not in self._released:
                 stop = self._at_sign(index, time)
-        return LineView(line, distance, stop if distance > -_OVERRUN else None, gives_way)
+        return LineView(line, distance, stop if distance > -_OVERRUN else None, goes_first)
 
     def _at_sign(self, index: int, time: float) -> str | None:
         """Whether to stand on: for a while, and for those who were there first."""
@@ -84,8 +85,10 @@ class Junctions:
         label = f"stop sign {self._lines[index].lane}"
         return f"{label} for {', '.join(map(str, others))}" if others else label
 
-    def _at_signal(self, index: int, distance: float, time: float, speed: float) -> tuple[str | None, bool]:
-        signal = self._lines[index].signal_id or ""
+    def _at_signal(self, index: int, distance: float, time: float, speed: float) -> tuple[str | None, frozenset[str]]:
+        """Why to stop, if that is so, and who goes first."""
+        line = self._lines[index]
+        signal = line.signal_id or ""
         colour = self._colour(signal, time)
         needed = speed * speed / (2.0 * max(distance, 0.1))
         if colour is SignalColour.YELLOW and needed > self._config.yellow_braking:
@@ -95,13 +98,16 @@ class Junctions:
             if needed > self._config.hard_braking:
                 self._entered.add(index)
         if colour in (SignalColour.RED, SignalColour.YELLOW):
-            return (None if index in self._entered else f"stop {colour.value} {signal}"), False
+            # Who is slow on the junction at red is too late to clear it: the others have green.
+            is_late = colour is SignalColour.RED and speed < _ROLLING
+            stop = None if index in self._entered else f"stop {colour.value} {signal}"
+            return stop, line.yields_to | line.crosses if is_late else _NOBODY
         if colour is not None:
-            return None, colour is not SignalColour.GREEN
+            return None, _NOBODY if colour is SignalColour.GREEN else line.yields_to
         reach = speed * speed / (2.0 * self._config.comfort_braking) + self._config.unseen_reach
         if distance > reach or index in self._entered or self._stood(index, time, self._config.unseen_patience):
-            return None, True
-        return f"stop unseen {signal}", True
+            return None, line.yields_to
+        return f"stop unseen {signal}", line.yields_to
 
     def _colour(self, signal: str, time: float) -> SignalColour | None:
         seen, colour = self._seen.get(signal, (-1e9, None))
@@ -119,10 +125,10 @@ def has_priority(views: list[LineView], station: float, lanes: tuple[str, ...]) 
 
     None where the map does not tell: they do not meet on a junction, or not on conflicting lanes.
     """
-    for line, _, _, gives_way in views:
+    for line, _, _, goes_first in views:
         if line.station - 1.0 <= station <= line.exit_station + _MERGE_REACH:
-            if not line.yields_to.isdisjoint(lanes):
-                return gives_way
-            if not line.crosses.isdisjoint(lanes):
+            if not goes_first.isdisjoint(lanes):
+                return True
+            if not (line.yields_to.isdisjoint(lanes) and line.crosses.isdisjoint(lanes)):
                 return False
     return None

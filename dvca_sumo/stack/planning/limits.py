@@ -15,7 +15,7 @@ from dvca_sumo.stack.planning.st_graph import Graph
 
 _PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
 _PRIORITY = Control.PRIORITY
-_SLOW_FOR_PERSON = (3.0, 6.0)  # [m/s], [m/s per m of gap]
+_SLOW_FOR_PERSON = (1.5, 6.0)  # [m/s], [m/s per m of gap]
 _SLOW_FOR_OBJECT = (4.0, 10.0)  # [m/s], [m/s per m of gap]
 _SLOW_MOVER = 3.0  # [m/s] faster ones are not passed slowly
 _GIVE_AT_DESTINATION = 1.0  # [m]
@@ -39,8 +39,8 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
         if high > 0.0:
             part = slice(max(int(low), 0), int(high) + 1)
             caps[part] = np.minimum(caps[part], cap)
-    for line, distance, _, gives_way in views:
-        if gives_way and line.yields_to and distance > 0.0 and line.control is not _PRIORITY:
+    for line, distance, _, goes_first in views:
+        if goes_first and distance > 0.0 and line.control is not _PRIORITY:
             part = slice(int(distance), int(distance) + 2)
             caps[part] = np.minimum(caps[part], config.give_way_speed)
     slowed: list[float] = slowed_before(caps, path.arcs, config.slowing).tolist()
@@ -61,18 +61,24 @@ def nearest_stop(
     """
     stops = [Stop(to_destination, _GIVE_AT_DESTINATION, "stop destination")]
     stops += [_at_line(view.distance, view.stop, config) for view in views if view.stop]
-    occupied_from = math.inf
+    occupied_from = blocked_from = math.inf
     obstacle = _obstacle(graph, shape, config)
     if obstacle is not None:
         occupied_from = float(graph.low[obstacle, 0]) - shape.front
+        if graph.scene.classes[graph.scene.owners[obstacle]] != _VEHICLE:
+            blocked_from = occupied_from
         label = f"stop behind {graph.track(obstacle)}"
         gap = -config.object_gap if config.stops_past_objects else config.object_gap
         stops.append(Stop(occupied_from - gap, config.object_gap - _GIVE_AT_OBJECT, label))
     if leader is not None and max(leader.speeds[0], leader.speeds[_SOON_STEP]) < _TIMID:
         occupied_from = min(occupied_from, leader.rears[0])
     for line, distance, _, _ in views:
-        room = occupied_from - (distance + line.exit_station - line.station)
-        if line.crosses and distance > 0.0 and 0.0 < room < shape.length + config.follow_gap:
+        if not line.crosses or distance <= 0.0:
+            continue
+        leave = distance + line.exit_station - line.station
+        is_exit_occupied = 0.0 < occupied_from - leave < shape.length + config.follow_gap
+        # Behind vehicles the ego may wait on the junction: they go on.
+        if is_exit_occupied or distance < blocked_from <= leave:
             stops.append(_at_line(distance, "stop exit occupied", config))
     return min(stops, key=lambda stop: stop.at)
 

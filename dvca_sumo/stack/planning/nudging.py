@@ -190,13 +190,15 @@ class NudgeDecider:
         return self._is_free(offset, band, situation.speed, situation.scene)
 
     def _is_in_traffic(self, blocker: _Blocker, situation: Situation) -> bool:
-        """Who was seen driving and now stands in the middle of our lane, with a junction ahead, may be in a queue.
+        """Who stands in the middle of our lane, with a junction ahead, may be in a queue, if it was seen driving.
 
-        However far ahead of it, and out of sight, that begins.
+        However far ahead of it, and out of sight, that begins. Nearer to the junction it may be, seen or not.
         """
         offset = abs(float(situation.scene.now.offsets[blocker.row]))
-        has_junction = any(view.distance + self._shape.front > blocker.high for view in situation.views)
-        return blocker.track in self._driven and offset < _IN_LANE and has_junction
+        ahead = [view.distance + self._shape.front - blocker.high for view in situation.views]
+        lines = [distance for distance in ahead if distance > 0.0]
+        is_driver = blocker.track in self._driven or min(lines, default=0.0) < self._config.queue_length
+        return is_driver and offset < _IN_LANE and bool(lines)
 
     def _is_queueing(self, blocker: _Blocker, situation: Situation) -> bool:
         """A vehicle in our lane may just wait, however long it has stood: near a line, or behind one that waits."""

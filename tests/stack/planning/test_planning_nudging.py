@@ -90,6 +90,13 @@ def test_car_that_queues_behind_others_up_to_a_signal_is_not_passed() -> None:
     assert driven.speeds[-1] == 0.0
 
 
+def test_car_that_may_hide_a_queue_up_to_a_signal_is_not_passed() -> None:
+    route = road(lanes_left=1, stop_lines=[stop_line(190.0, Control.SIGNAL)])
+    driven = drive(route, 30.0, speed=10.0, actors=[car(5, 114.0)])
+    assert offsets(driven) == pytest.approx((0.0, 0.0), abs=0.05)
+    assert driven.speeds[-1] == 0.0
+
+
 def test_two_cones_one_behind_the_other_are_passed_in_one_go() -> None:
     driven = drive(road(lanes_left=1), 25.0, speed=12.0, actors=[cone(5, 110.0), cone(6, 125.0)])
     between = (driven.fronts > 113.0) & (driven.fronts < 125.0)

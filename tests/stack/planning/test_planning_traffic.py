@@ -164,6 +164,17 @@ def test_car_that_should_wait_but_cannot_any_more_is_yielded_to() -> None:
     assert driven.states[:, 5].min() < -2.0
 
 
+@pytest.mark.parametrize("lane", ["major_0", "minor_0"])
+def test_ego_that_is_slow_on_the_junction_at_red_lets_the_others_go(lane: str) -> None:
+    route = road(stop_lines=[stop_line(22.0, Control.SIGNAL)])
+    stream = [car(k, 30.0, -60.0 - 30.0 * k, heading=UP, speed=10.0, lanes=(lane,)) for k in range(4)]
+    red: dict[str, SignalColour] = {"J/2": SignalColour.RED}
+    driven = drive(route, 30.0, station=20.0, actors=stream, signals=lambda _: red)
+    assert driven.fronts[0] > 22.5
+    assert driven.clearances.min() > 1.0
+    assert driven.fronts[-1] > 60.0
+
+
 def test_crossing_traffic_has_no_priority_over_green_but_over_permissive_green() -> None:
     actors = [car(3, 106.0, -75.0, heading=UP, speed=8.0, stays_from=7.0, lanes=("major_0",))]
     route = road(stop_lines=[stop_line(100.0, Control.SIGNAL)])
