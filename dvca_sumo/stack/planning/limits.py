@@ -15,7 +15,7 @@ from dvca_sumo.stack.planning.st_graph import Graph
 
 _PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
 _PRIORITY = Control.PRIORITY
-_SLOW_FOR_PERSON = (1.5, 6.0)  # [m/s], [m/s per m of gap]
+_SLOW_FOR_PERSON = (3.0, 6.0)  # [m/s], [m/s per m of gap]
 _SLOW_FOR_OBJECT = (4.0, 10.0)  # [m/s], [m/s per m of gap]
 _SLOW_MOVER = 3.0  # [m/s] faster ones are not passed slowly
 _GIVE_AT_DESTINATION = 1.0  # [m]
