@@ -8,9 +8,10 @@ from collections.abc import Sequence
 
 
 class Itinerary:
-    """The edges of a trip, and how far it has come."""
+    """The edges of a trip, and how far it has come; `route` is SUMO's name of what it was told last."""
 
-    def __init__(self, edges: Sequence[str]) -> None:
+    def __init__(self, edges: Sequence[str], route: str) -> None:
+        self.route = route
         self._edges = tuple(edges)
         self._reached = 0
 

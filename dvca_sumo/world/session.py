@@ -81,7 +81,6 @@ class Session:
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
         self._itineraries: dict[str, Itinerary] = {}  # by ego
-        self._routes: dict[str, str] = {}  # by ego, SUMO's name of its route
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
 
     @property
@@ -184,8 +183,7 @@ class Session:
         of.setWidth(entry.ego, entry.width)
         of.setVehicleClass(entry.ego, entry.vehicle_class)
         of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
-        self._itineraries[entry.ego] = Itinerary(entry.edges)
-        self._routes[entry.ego] = of.getRouteID(entry.ego)
+        self._itineraries[entry.ego] = Itinerary(entry.edges, of.getRouteID(entry.ego))
         self.watch(entry.ego, radius)
 
     def skip_stops(self, vehicle: str) -> None:
@@ -205,7 +203,7 @@ class Session:
 
     def remove(self, vehicle: str) -> None:
         """Take a vehicle out of the simulation."""
-        del self._crowds[vehicle]
+        del self._crowds[vehicle], self._itineraries[vehicle]
         of = libsumo.vehicle
         for kind in (tc.CMD_GET_VEHICLE_VARIABLE, tc.CMD_GET_PERSON_VARIABLE):
             of.unsubscribeContext(vehicle, kind, 0.0)  # else SUMO gives up at the next step
@@ -226,7 +224,7 @@ class Session:
         y = truth.y + front * math.sin(truth.heading)
         angle = 90.0 - math.degrees(truth.heading)
         self._itineraries[ego].reach(edge)
-        if libsumo.vehicle.getRouteID(ego) != self._routes[ego]:
+        if libsumo.vehicle.getRouteID(ego) != self._itineraries[ego].route:
             self._remind(ego)
         libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, angle, keepRoute=2, matchThreshold=_MATCHED_WITHIN)
         # SUMO derives a wrong speed on junction and opposite lanes; drivers behind must react to the true one.
@@ -294,10 +292,11 @@ class Session:
         if not lane:
             return  # it is beside the road
         is_between = lane.startswith(":")
-        onward = self._itineraries[ego].onward(of.getRoute(ego)[row : row + 1 + is_between])
+        itinerary = self._itineraries[ego]
+        onward = itinerary.onward(of.getRoute(ego)[row : row + 1 + is_between])
         if onward:
             of.setRoute(ego, onward)
-            self._routes[ego] = of.getRouteID(ego)
+            itinerary.route = of.getRouteID(ego)
 
     def _vehicle(self, name: str) -> str:
         """The key of a vehicle among the bodies."""

@@ -58,7 +58,7 @@ def test_who_must_wait_for_the_ego_does_so_also_after_it_has_been_off_its_lane(
 
 
 def test_a_trip_goes_on_from_where_it_is_taken_to_be() -> None:
-    itinerary = Itinerary(LOOP)
+    itinerary = Itinerary(LOOP, "r")
     assert itinerary.onward(("bc",)) == ("bc", "ca", "ab", "bd")
     assert itinerary.onward(("xb", "bc")) == ("xb", "bc", "ca", "ab", "bd")
     assert itinerary.onward(("ab", "bc")) == LOOP
@@ -67,7 +67,7 @@ def test_a_trip_goes_on_from_where_it_is_taken_to_be() -> None:
 
 
 def test_a_trip_that_comes_by_an_edge_again_is_not_begun_anew() -> None:
-    itinerary = Itinerary(LOOP)
+    itinerary = Itinerary(LOOP, "r")
     for edge in ("ab", ":b_0", "bc", ":c_0", "ca", "ab"):
         itinerary.reach(edge)
     assert itinerary.onward(("ab",)) == ("ab", "bd")

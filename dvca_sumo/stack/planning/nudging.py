@@ -199,15 +199,15 @@ class NudgeDecider:
         return self._is_free(offset, band, situation.speed, situation.scene)
 
     def _is_in_traffic(self, blocker: _Blocker, situation: Situation) -> bool:
-        """Who stands in the middle of our lane, with a junction ahead, may be in a queue, if it was seen driving.
+        """Who stands in the middle of our lane, with a junction ahead, may be in a queue that it hides.
 
-        However far ahead of it, and out of sight, that begins. Nearer to the junction it may be, seen or not.
+        Near the junction anyone may; farther away, who was seen driving.
         """
-        offset = abs(float(situation.scene.now.offsets[blocker.row]))
-        ahead = [view.distance + self._shape.front - blocker.high for view in situation.views]
-        lines = [distance for distance in ahead if distance > 0.0]
-        is_driver = blocker.track in self._driven or min(lines, default=0.0) < self._config.queue_length
-        return is_driver and offset < _IN_LANE and bool(lines)
+        to_lines = [view.distance + self._shape.front - blocker.high for view in situation.views]
+        to_line = min((distance for distance in to_lines if distance > 0.0), default=None)
+        if to_line is None or abs(float(situation.scene.now.offsets[blocker.row])) >= _IN_LANE:
+            return False
+        return blocker.track in self._driven or to_line < self._config.queue_length
 
     def _is_queueing(self, blocker: _Blocker, situation: Situation) -> bool:
         """A vehicle in our lane may just wait, however long it has stood: near a line, or behind one that waits."""
