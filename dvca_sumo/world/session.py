@@ -25,6 +25,7 @@ from dvca_sumo.world.crowd import Body, Crowd
 from dvca_sumo.world.entry import Entry
 from dvca_sumo.world.itinerary import Itinerary
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
+from dvca_sumo.world.setback import Setback
 from dvca_sumo.world.signals import Signals
 
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
@@ -81,6 +82,7 @@ class Session:
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
         self._itineraries: dict[str, Itinerary] = {}  # by ego
+        self._setbacks: dict[str, Setback] = {}  # by ego
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
 
     @property
@@ -184,6 +186,7 @@ class Session:
         of.setVehicleClass(entry.ego, entry.vehicle_class)
         of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
         self._itineraries[entry.ego] = Itinerary(entry.edges, of.getRouteID(entry.ego))
+        self._setbacks[entry.ego] = Setback()
         self.watch(entry.ego, radius)
 
     def skip_stops(self, vehicle: str) -> None:
@@ -203,7 +206,7 @@ class Session:
 
     def remove(self, vehicle: str) -> None:
         """Take a vehicle out of the simulation."""
-        del self._crowds[vehicle], self._itineraries[vehicle]
+        del self._crowds[vehicle], self._itineraries[vehicle], self._setbacks[vehicle]
         of = libsumo.vehicle
         for kind in (tc.CMD_GET_VEHICLE_VARIABLE, tc.CMD_GET_PERSON_VARIABLE):
             of.unsubscribeContext(vehicle, kind, 0.0)  # else SUMO gives up at the next step
@@ -220,12 +223,14 @@ class Session:
             indicated: Which way it indicates: 1 left, -1 right, 0 not at all.
         """
         edge, _, index = lane.rpartition("_")
-        x = truth.x + front * math.cos(truth.heading)
-        y = truth.y + front * math.sin(truth.heading)
+        found = libsumo.vehicle.getLaneID(ego)
+        ahead = front - self._setbacks[ego].at(truth.x, truth.y, truth.speed, is_on_lane=bool(found))
+        x = truth.x + ahead * math.cos(truth.heading)
+        y = truth.y + ahead * math.sin(truth.heading)
         angle = 90.0 - math.degrees(truth.heading)
         self._itineraries[ego].reach(edge)
-        if libsumo.vehicle.getRouteID(ego) != self._itineraries[ego].route:
-            self._remind(ego)
+        if found and libsumo.vehicle.getRouteID(ego) != self._itineraries[ego].route:
+            self._remind(ego, found)
         libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, angle, keepRoute=2, matchThreshold=_MATCHED_WITHIN)
         # SUMO derives a wrong speed on junction and opposite lanes; drivers behind must react to the true one.
         libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
@@ -285,12 +290,9 @@ class Session:
         """End the simulation; the process may start another."""
         libsumo.close()
 
-    def _remind(self, ego: str) -> None:
-        """Tell SUMO the rest of an ego's trip again, as soon as it sees it on the way."""
-        of = libsumo.vehicle
-        lane, row = of.getLaneID(ego), of.getRouteIndex(ego)
-        if not lane:
-            return  # it is beside the road
+    def _remind(self, ego: str, lane: str) -> None:
+        """Tell SUMO the rest of an ego's trip again, as soon as it sees it, on `lane`, on the way."""
+        of, row = libsumo.vehicle, libsumo.vehicle.getRouteIndex(ego)
         is_between = lane.startswith(":")
         itinerary = self._itineraries[ego]
         onward = itinerary.onward(of.getRoute(ego)[row : row + 1 + is_between])
