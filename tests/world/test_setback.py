@@ -34,7 +34,7 @@ def test_an_ego_that_creeps_over_a_joint_is_lost_for_a_moment_at_most(
         roadmap = RoadMap.load(net)
         ego = world.adopt(entry, roadmap.route(entry.edges, entry.lane, entry.position, None, 80.0), VehicleLimits())
         lanes = []
-        for left in [-0.05] * 24 + [0.0] * 276:
+        for left in [-0.05] * 24 + [0.0] * 246:
             ego.vehicle.advance(ControlCommand(world.time, 0.0, 0.0, PoseStep(0.05, left, 0.0, 0.0)), STEP)
             world.advance()
             lanes.append(libsumo.vehicle.getLaneID("ego"))
