@@ -18,7 +18,6 @@ _ALONG = 1.0  # [m] kept lengthwise around an object before the ego moves back
 _IN_LANE = 1.2  # [m] vehicles whose centre is this near the line are in our lane, not parked beside it
 _OVER_LINE = 0.1  # [m] over the lane marking is not yet another lane
 _COMMITTED = 0.5  # of the offset: from there on it is safer to go on than to go back
-_SAME = 0.9  # of the offset: less was chosen so as to stay in lane
 _SLOWEST = 3.0  # [m/s] assumed of the ego when it passes
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane
 _CLOSING = 2.0  # [s] of closing speed kept to those who come from behind
@@ -135,23 +134,19 @@ class NudgeDecider:
     def _offset(self, blocker: _Blocker, situation: Situation) -> float | None:
         """The offset to pass at: on the side of the last cycle if that still works, else the smaller one.
 
-        It leaves the lane for the wanted clearance, if it may; with less, it stays. None where there is no way round,
-        or where none is needed.
+        None where there is no way round, or where none is needed.
         """
         window = situation.window
         span = window.span(blocker.low - self._shape.front, blocker.high + self._shape.rear_overhang)
         lane_left = float(window.lane_left[span].min()) + _OVER_LINE
         lane_right = float(window.lane_right[span].max()) - _OVER_LINE
         held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
-        rightmost, leftmost = min(lane_right + self._half, 0.0), max(lane_left - self._half, 0.0)
         offsets = self._candidates(blocker, window, span)
-        for wanted in sorted(offsets, key=lambda offset: (offset * held <= 0.0, abs(offset))):
-            offset = wanted
-            if not rightmost <= wanted <= leftmost and not self._may_leave_lane(blocker, wanted, situation):
-                offset = min(max(wanted, rightmost), leftmost)
-                if not self._clears(blocker, offset):
-                    continue
-            if self._meets_another(blocker, offset, situation.scene):
+        for offset in sorted(offsets, key=lambda offset: (offset * held <= 0.0, abs(offset))):
+            stays_in_lane = lane_right + self._half <= offset <= lane_left - self._half
+            if self._meets_another(blocker, offset, situation.scene) or not (
+                stays_in_lane or self._may_leave_lane(blocker, offset, situation)
+            ):
                 continue
             is_same = abs(offset - held) < self._config.nudge_hold and self._clears(blocker, held)
             return (held if is_same else offset) or None
@@ -182,9 +177,8 @@ class NudgeDecider:
 
     def _may_leave_lane(self, blocker: _Blocker, offset: float, situation: Situation) -> bool:
         """For what will not move by itself, when the other lane is free; always to finish what was begun."""
-        held = self._held.get(blocker.track)
         is_committed = blocker.track not in self._since or situation.lateral.offset / offset > _COMMITTED
-        if held is not None and held.offset / offset > _SAME and is_committed:
+        if blocker.track in self._held and is_committed:
             return True
         kind = situation.scene.classes[blocker.row]
         if kind == _PERSON and self._is_near_line(blocker.high, situation.views):
