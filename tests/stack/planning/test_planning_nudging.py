@@ -75,8 +75,9 @@ def test_neighbouring_lane_is_not_used_while_somebody_is_on_it() -> None:
     assert driven.fronts[-1] > 130.0
 
 
-def test_car_that_queues_at_a_signal_is_not_passed() -> None:
-    route = road(lanes_left=1, stop_lines=[stop_line(120.0, Control.SIGNAL)])
+@pytest.mark.parametrize("line", [120.0, 190.0])
+def test_car_that_queues_at_a_signal_or_may_hide_a_queue_up_to_it_is_not_passed(line: float) -> None:
+    route = road(lanes_left=1, stop_lines=[stop_line(line, Control.SIGNAL)])
     driven = drive(route, 30.0, speed=10.0, actors=[car(5, 114.0)])
     assert offsets(driven) == pytest.approx((0.0, 0.0), abs=0.05)
     assert driven.speeds[-1] == 0.0
@@ -90,13 +91,6 @@ def test_car_that_queues_behind_others_up_to_a_signal_is_not_passed() -> None:
     assert driven.speeds[-1] == 0.0
 
 
-def test_car_that_may_hide_a_queue_up_to_a_signal_is_not_passed() -> None:
-    route = road(lanes_left=1, stop_lines=[stop_line(190.0, Control.SIGNAL)])
-    driven = drive(route, 30.0, speed=10.0, actors=[car(5, 114.0)])
-    assert offsets(driven) == pytest.approx((0.0, 0.0), abs=0.05)
-    assert driven.speeds[-1] == 0.0
-
-
 def test_lane_is_not_left_for_a_person_who_waits_by_a_crossing() -> None:
     route = road(lanes_left=1, stop_lines=[stop_line(120.0, Control.PRIORITY, yields_to=frozenset())])
     driven = drive(route, 30.0, speed=10.0, actors=[person(5, 117.0, -1.35)])
@@ -105,6 +99,12 @@ def test_lane_is_not_left_for_a_person_who_waits_by_a_crossing() -> None:
     apart = drive(road(lanes_left=1), 30.0, speed=10.0, actors=[person(5, 117.0, -1.35)])
     assert offsets(apart)[1] > 1.0
     assert apart.fronts[-1] > 150.0
+
+
+def test_ego_that_stands_close_to_a_person_beside_its_way_drives_on() -> None:
+    driven = drive(road(), 15.0, station=20.0, actors=[person(5, 24.6, -1.62)])
+    assert driven.clearances.min() > 0.35
+    assert driven.fronts[-1] > 60.0
 
 
 def test_two_cones_one_behind_the_other_are_passed_in_one_go() -> None:

@@ -175,6 +175,13 @@ def test_ego_that_is_slow_on_the_junction_at_red_lets_the_others_go(lane: str) -
     assert driven.fronts[-1] > 60.0
 
 
+def test_junction_is_not_entered_while_a_person_stands_in_the_way_on_it() -> None:
+    route = road(stop_lines=[stop_line(100.0, Control.PRIORITY, yields_to=frozenset())])
+    driven = drive(route, 20.0, speed=10.0, actors=[person(3, 110.0, 0.0)])
+    assert driven.speeds[-1] == 0.0
+    assert 98.0 < driven.fronts[-1] < 100.0
+
+
 def test_crossing_traffic_has_no_priority_over_green_but_over_permissive_green() -> None:
     actors = [car(3, 106.0, -75.0, heading=UP, speed=8.0, stays_from=7.0, lanes=("major_0",))]
     route = road(stop_lines=[stop_line(100.0, Control.SIGNAL)])
