@@ -142,6 +142,8 @@ class Meetings:
             nearest, until = float(graph.low[row, first]), float(scene.times[first])
         else:
             nearest = float(graph.low[row][graph.occupied[row]].min())
+            if nearest - _HARD_GAP <= front:  # its near end comes by; what gets into the way may do so further on
+                nearest = graph.contact(row)
             until = float(scene.times[last]) + config.clear_margin
             if last == len(scene.times) - 1:
                 until = math.inf

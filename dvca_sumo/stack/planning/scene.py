@@ -45,6 +45,7 @@ class Scene(msgspec.Struct, frozen=True, eq=False):
     lanes: list[tuple[str, ...]]  # (h,)
     futures: Extents  # (h, t)
     moving: int  # the first `moving` futures move, the others stay where they are
+    poses: Floats  # (moving, t, 3) [m], [m], [rad] of the box centres
 
 
 def scene_in(
@@ -86,6 +87,7 @@ def scene_in(
         lanes=[predicted.lanes[row] for row in rows.tolist()] + [()] * len(still),
         futures=futures,
         moving=len(rows),
+        poses=poses,
     )
 
 

@@ -33,6 +33,7 @@ class Graph(msgspec.Struct, frozen=True, eq=False):
     path: Path
     scene: Scene
     occupied: Flags  # (h, t)
+    margins: Floats  # (h,) [m] sideways, within which a future counts as in the way
     gaps: Floats  # (h, t) [m] sideways between body and object, negative where they would overlap
     low: Floats  # (h, t) [m] the object's near end along the path
     high: Floats  # (h, t) [m] its far end
@@ -43,6 +44,19 @@ class Graph(msgspec.Struct, frozen=True, eq=False):
         """Id of the object whose future row `row` is."""
         track: int = self.scene.ids[self.scene.owners[row]]
         return track
+
+    def contact(self, row: int) -> float:
+        """The first arc at which the body meets who moves, as future `row` has it; the path's last arc where nowhere.
+
+        That may lie beyond the near end of what passes aslant beside the ego, and draws near only further on.
+        """
+        scene, columns = self.scene, self.occupied[row].nonzero()[0]
+        boxes = np.tile(scene.boxes[scene.owners[row]], (len(columns), 1))
+        boxes[:, :3] = scene.poses[row, columns]
+        stations, gaps = _closely(boxes, self.window, self.path)
+        count = len(self.path.arcs)
+        nearest = stations[gaps < self.margins[row]].min(initial=count)
+        return float(np.interp(nearest, np.arange(count), self.path.arcs))
 
 
 def graph_of(
@@ -67,14 +81,16 @@ def graph_of(
     stretch[BEHIND:] = path.arcs - np.arange(count)
     centres = futures.stations + stretch[rows[0]]
     low, high = centres - futures.half_lengths, centres + futures.half_lengths
-    occupied = gaps < _margins(scene, window, route.crossings, config)[:, None]
+    margins = _margins(scene, window, route.crossings, config)
+    occupied = gaps < margins[:, None]
     occupied &= (high > -shape.rear_overhang) & (futures.stations < count - 2)
     for overpass in route.overpasses:
         _pass_over(occupied, overpass, scene, window)
     if config.trusts_lane_room:
         occupied[scene.moving :][_has_lane_room(scene, window, shape)] = False
     last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)
-    return Graph(window, path, scene, occupied, gaps, low, high, occupied.argmax(axis=1).tolist(), last.tolist())
+    first = occupied.argmax(axis=1).tolist()
+    return Graph(window, path, scene, occupied, margins, gaps, low, high, first, last.tolist())
 
 
 def _look_closely(gaps: Floats, scene: Scene, window: Window, path: Path) -> None:
@@ -82,11 +98,15 @@ def _look_closely(gaps: Floats, scene: Scene, window: Window, path: Path) -> Non
     doubtful = (np.abs(gaps[:, 0]) < _DOUBT).nonzero()[0]
     if not doubtful.size:
         return
-    points = outlines(scene.boxes[scene.owners[scene.moving + doubtful]], _PARTS)
-    stations, offsets, _ = window.project(points.reshape(-1, 2))
-    rows = window.index(stations)
-    beside = np.maximum(offsets - path.left[rows], path.right[rows] - offsets)
+    _, beside = _closely(scene.boxes[scene.owners[scene.moving + doubtful]], window, path)
     gaps[doubtful] = beside.reshape(len(doubtful), -1).min(axis=1)[:, None]
+
+
+def _closely(boxes: Floats, window: Window, path: Path) -> tuple[Floats, Floats]:
+    """Stations of points all around boxes (n, 5), box by box, and how far each is beside the body there [m]."""
+    stations, offsets, _ = window.project(outlines(boxes, _PARTS).reshape(-1, 2))
+    rows = window.index(stations)
+    return stations, np.maximum(offsets - path.left[rows], path.right[rows] - offsets)
 
 
 def _pass_over(occupied: Flags, overpass: Overpass, scene: Scene, window: Window) -> None:

@@ -5,7 +5,18 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import SHAPE, assert_drivable, believed, car, drive, person, predicted, road, stop_line
+from planned_drives import (
+    SHAPE,
+    assert_drivable,
+    believed,
+    car,
+    curve_points,
+    drive,
+    person,
+    predicted,
+    road,
+    stop_line,
+)
 
 from dvca_sumo.messages import SignalColour
 from dvca_sumo.roadmap.route import Control, Crossing, Overpass
@@ -130,6 +141,19 @@ def test_car_with_priority_from_a_side_road_is_yielded_to() -> None:
     assert "yield 3" in driven.decisions
     assert driven.clearances.min() > 2.0
     assert driven.fronts[-1] > 150.0
+    assert_drivable(driven)
+
+
+@pytest.mark.parametrize("ahead", [30.0, 40.0, 50.0])
+@pytest.mark.parametrize("radius", [10.0, 12.0])
+def test_ego_half_way_round_a_left_turn_waits_for_who_comes_past_it_and_then_across(
+    radius: float, ahead: float
+) -> None:
+    junction = stop_line(101.0, Control.YIELD, exit_station=126.0)
+    oncoming = car(3, 106.0 + ahead, 3.0, heading=math.pi - 0.03, speed=13.0, lanes=("major_0",))
+    driven = drive(road(curve_points(radius), stop_lines=[junction]), 12.0, station=106.0, actors=[oncoming])
+    assert driven.clearances.min() > 0.5
+    assert driven.states[-1, 2] > 40.0
     assert_drivable(driven)
 
 
