@@ -18,6 +18,7 @@ _SPEEDS_UP = 0.4  # [m/s] faster over the next second than now
 _CUTS_IN = 0.5  # [m] moved sideways before the meeting: the other comes into our lane, not we into theirs
 _STAYS = 2  # columns of the graph, after which somebody is on the path to drive along it
 _HARD_GAP = 0.5  # [m] to the other's way, defended by hard braking
+_LEAST_ROOM = 0.1  # [m]
 _CLEAR_GAP = 0.5  # [m] lengthwise behind somebody who has passed
 _AT_LINE = 0.5  # [m] past the stop line the ego may still wait at it
 
@@ -71,9 +72,9 @@ class Meetings:
             return None
         stop = self._stop(row, graph, views)
         room = stop.at + stop.give
-        if room <= 0.0:  # beside the ego already, or nearly: stopping there would not help
+        if room <= -_HARD_GAP:  # beside the ego already: stopping there would not help
             return None
-        is_too_late = profile.speeds[0] ** 2 / (2.0 * room) > config.hard_braking
+        is_too_late = profile.speeds[0] ** 2 / (2.0 * max(room, _LEAST_ROOM)) > config.hard_braking
         if is_too_late and self._passes([row], graph, profile, 0.0)[0]:
             return None
         return Demand(row, stop, follows=self._joins(row, graph))
@@ -142,14 +143,14 @@ class Meetings:
             nearest, until = float(graph.low[row, first]), float(scene.times[first])
         else:
             nearest = float(graph.low[row][graph.occupied[row]].min())
-            if nearest - _HARD_GAP <= front:  # its near end comes by; what gets into the way may do so further on
-                nearest = graph.contact(row)
             until = float(scene.times[last]) + config.clear_margin
             if last == len(scene.times) - 1:
                 until = math.inf
+        if nearest - _HARD_GAP <= front:  # its near end comes by; what gets into the way may do so further on
+            nearest = graph.contact(row)
         at = nearest - gap - front
         for line, distance, _, _ in views:
             is_within = distance - 1.0 <= nearest - front <= distance + line.exit_station - line.station
             if is_within and distance > -_AT_LINE:
                 at = min(at, distance - config.stop_line_gap)
-        return Stop(at, max(nearest - _HARD_GAP - front - at, 0.0), f"yield {graph.track(row)}", until)
+        return Stop(at, nearest - _HARD_GAP - front - at, f"yield {graph.track(row)}", until)

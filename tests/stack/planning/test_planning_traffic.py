@@ -157,6 +157,16 @@ def test_ego_half_way_round_a_left_turn_waits_for_who_comes_past_it_and_then_acr
     assert_drivable(driven)
 
 
+@pytest.mark.parametrize(("speed", "x"), [(0.0, 105.0), (1.0, 105.4), (2.0, 105.8), (2.0, 106.2)])
+def test_ego_stops_at_once_for_a_car_that_comes_out_right_before_its_bumper(speed: float, x: float) -> None:
+    junction = stop_line(98.0, Control.PRIORITY, yields_to=frozenset())
+    coming = car(3, x, -3.0, heading=UP, speed=2.5, lanes=("minor_0",))
+    driven = drive(road(stop_lines=[junction]), 8.0, speed=speed, station=100.0, actors=[coming])
+    assert driven.clearances.min() > 0.1
+    assert driven.fronts[-1] > 110.0
+    assert_drivable(driven)
+
+
 def test_stream_with_priority_is_waited_for_at_the_line() -> None:
     stream = [car(k, 106.0, -60.0 - 25.0 * k, heading=UP, speed=10.0, lanes=("major_0",)) for k in range(8)]
     driven = drive(road(stop_lines=[stop_line(100.0, Control.YIELD)]), 40.0, speed=13.0, actors=stream)
