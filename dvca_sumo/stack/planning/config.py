@@ -16,14 +16,14 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     # Limits of motion.
     cruise_fraction: float = 0.97  # of the speed limit: room for what control overshoots
-    acceleration: float = 1.8  # [m/s^2] comfort
+    acceleration: float = 2.0  # [m/s^2] comfort
     braking: float = 1.2  # [m/s^2] b of the intelligent driver model: stops then take about twice that
     slowing: float = 1.5  # [m/s^2] before curves and lower limits
     comfort_braking: float = 2.5  # [m/s^2] not exceeded unless there is no other way
     hard_braking: float = 7.5  # [m/s^2] what dry asphalt allows with something in reserve
     jerk: float = 4.0  # [m/s^3] comfort
     hard_jerk: float = 20.0  # [m/s^3] when braking harder than comfort
-    lateral_acceleration: float = 2.0  # [m/s^2] in curves
+    lateral_acceleration: float = 2.5  # [m/s^2] in curves
     shift_acceleration: float = 1.2  # [m/s^2] when moving sideways
     hard_shift_acceleration: float = 2.5  # [m/s^2] when there is no room for comfort
     curvature: float = 0.15  # [1/m] of a sideways move at low speed: within the steering of a car
@@ -33,8 +33,8 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     object_gap: float = 5.0  # [m] behind what stands: leaves room to pull out later
     yield_gap: float = 2.0  # [m] before the way of a crossing vehicle
     person_gap: float = 3.0  # [m] before the way of a crossing person
-    follow_gap: float = 4.0  # [m] behind a leader that stops
-    headway: float = 1.5  # [s] behind a moving leader
+    follow_gap: float = 3.0  # [m] behind a leader that stops
+    headway: float = 1.2  # [s] behind a moving leader
 
     # Distances kept sideways, from the side of the body.
     object_margin: float = 0.3  # [m] closer than this counts as in the way

@@ -9,6 +9,7 @@ from planned_drives import LIMIT, Drive, assert_drivable, curve_points, drive, r
 
 from dvca_sumo.messages import Floats, SignalColour
 from dvca_sumo.roadmap.route import Control, Route
+from dvca_sumo.stack.planning import PlanningConfig
 
 
 def test_free_road_is_driven_at_the_limit_and_not_above() -> None:
@@ -41,7 +42,7 @@ def test_curve_is_taken_slowly_and_on_the_line(radius: float) -> None:
     _, offsets = route.line.project(driven.states[:, 1:3])
     assert np.abs(offsets).max() < 0.1
     lateral = driven.speeds**2 * np.abs(driven.states[:, 6])
-    assert lateral.max() < 2.4
+    assert lateral.max() < 1.2 * PlanningConfig().lateral_acceleration
     assert driven.speeds[driven.states[:, 6] > 0.9 / radius].max() > 0.7 * math.sqrt(2.0 * radius)
     assert_drivable(driven)
 
