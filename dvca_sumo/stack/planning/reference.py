@@ -66,8 +66,7 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         rows[_COS], rows[_SIN], rows[_HEADING] = np.cos(headings), np.sin(headings), headings
         rows[_CURVATURE] = np.gradient(headings) / np.hypot(slopes, scale)
         rows[_LIMIT] = self.speed_limits
-        rows[_LANE_LEFT] = np.maximum(self.lane_left - offsets, 0.5 * width)
-        rows[_LANE_RIGHT] = np.minimum(self.lane_right - offsets, -0.5 * width)
+        rows[_LANE_LEFT], rows[_LANE_RIGHT] = 0.5 * width, -0.5 * width
         rows[_ROAD_LEFT], rows[_ROAD_RIGHT] = self.road_left - offsets, self.road_right - offsets
         return Window(self.station, rows, *rows)
 

@@ -114,3 +114,14 @@ def test_one_that_pulls_into_the_gap_in_time_is_let_in() -> None:
     driven = drive(crossing_over(), 40.0, speed=13.0, station=start - 20.0, actors=[merging])
     assert driven.clearances.min() > 1.0
     assert lane_at(driven, LATEST) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("speed", [3.0, 4.0])
+@pytest.mark.parametrize("station", [110.0, 116.0])
+def test_while_it_waits_it_does_not_go_around_a_standing_car_on_the_lane_it_waits_for(
+    station: float, speed: float
+) -> None:
+    beside = car(7, station - 2.6, WIDTH, speed=speed, leaves=1.0)
+    behind = car(8, station - 10.6, WIDTH, speed=speed, leaves=2.0)
+    driven = drive(crossing_over(), 12.0, station=station, actors=[car(99, station + 12.0), beside, behind])
+    assert driven.clearances.min() > 0.5
