@@ -19,6 +19,8 @@ _CUTS_IN = 0.5  # [m] moved sideways before the meeting: the other comes into ou
 _STAYS = 2  # columns of the graph, after which somebody is on the path to drive along it
 _HARD_GAP = 0.5  # [m] to the other's way, defended by hard braking
 _LEAST_ROOM = 0.1  # [m]
+_BESIDE_PERSON = 1.0  # [m] behind the front bumper, an ego that moves no faster than ...
+_CREEPING = 1.5  # ... [m/s] stands still for people who come up to its side
 _CLEAR_GAP = 0.5  # [m] lengthwise behind somebody who has passed
 _AT_LINE = 0.5  # [m] past the stop line the ego may still wait at it
 
@@ -72,7 +74,9 @@ class Meetings:
             return None
         stop = self._stop(row, graph, views)
         room = stop.at + stop.give
-        if room <= -_HARD_GAP:  # beside the ego already: stopping there would not help
+        is_person = graph.scene.classes[graph.scene.owners[row]] == _PERSON
+        beside = _BESIDE_PERSON if is_person and profile.speeds[0] < _CREEPING else 0.0
+        if room <= -_HARD_GAP - beside:  # stopping there would not help
             return None
         is_too_late = profile.speeds[0] ** 2 / (2.0 * max(room, _LEAST_ROOM)) > config.hard_braking
         if is_too_late and self._passes([row], graph, profile, 0.0)[0]:

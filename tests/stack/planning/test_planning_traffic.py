@@ -116,6 +116,14 @@ def test_person_walking_along_the_road_is_just_passed() -> None:
     assert driven.speeds.min() > 12.5
 
 
+@pytest.mark.parametrize("x", [103.0, 103.4, 104.2])
+def test_ego_does_not_start_while_a_person_walks_up_to_its_front_corner(x: float) -> None:
+    driven = drive(road(), 12.0, station=100.0, actors=[person(3, x, -4.0, heading=UP, speed=1.2)])
+    within_the_way = (driven.states[:, 0] > 1.0) & (driven.states[:, 0] < 4.0)
+    assert driven.speeds[within_the_way].max() == 0.0
+    assert driven.fronts[-1] > 120.0
+
+
 def test_person_who_is_long_across_before_the_ego_comes_is_no_reason_to_stop() -> None:
     driven = drive(road(), 15.0, speed=10.0, actors=[person(3, 140.0, -2.0, heading=UP, speed=1.4)])
     assert driven.speeds.min() > 9.5
