@@ -33,7 +33,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     object_gap: float = 5.0  # [m] behind what stands: leaves room to pull out later
     yield_gap: float = 2.0  # [m] before the way of a crossing vehicle
     person_gap: float = 3.0  # [m] before the way of a crossing person
-    follow_gap: float = 3.0  # [m] behind a leader that stops
+    follow_gap: float = 4.0  # [m] behind a leader that stops: still enough to pull out
     headway: float = 1.2  # [s] behind a moving leader
 
     # Distances kept sideways, from the side of the body.

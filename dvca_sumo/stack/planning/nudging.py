@@ -193,15 +193,15 @@ class NudgeDecider:
         return self._is_free(offset, band, situation.speed, situation.scene)
 
     def _is_in_traffic(self, blocker: _Blocker, situation: Situation) -> bool:
-        """Who stands in the middle of our lane, with a junction ahead, may be in a queue that it hides.
+        """Who stands in the middle of our lane may be in a queue that it hides.
 
-        Near the junction anyone may; farther away, who was seen driving.
+        Near a junction anyone may; farther away, who was seen driving.
         """
-        to_lines = [view.distance + self._shape.front - blocker.high for view in situation.views]
-        to_line = min((distance for distance in to_lines if distance > 0.0), default=None)
-        if to_line is None or abs(float(situation.scene.now.offsets[blocker.row])) >= _IN_LANE:
+        if abs(float(situation.scene.now.offsets[blocker.row])) >= _IN_LANE:
             return False
-        return blocker.track in self._driven or to_line < self._config.queue_length
+        to_lines = [view.distance + self._shape.front - blocker.high for view in situation.views]
+        is_near = any(0.0 < distance < self._config.queue_length for distance in to_lines)
+        return is_near or blocker.track in self._driven
 
     def _is_queueing(self, blocker: _Blocker, situation: Situation) -> bool:
         """A vehicle in our lane may just wait, however long it has stood: near a line, or behind one that waits."""

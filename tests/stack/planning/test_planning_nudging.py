@@ -164,3 +164,9 @@ def test_a_bus_that_starts_while_it_is_passed_is_not_cut_off(leaves: float) -> N
     assert 94.0 < at_start < 115.0
     assert driven.clearances.min() > 0.4
     assert_drivable(driven)
+
+
+def test_car_that_was_seen_driving_is_passed_only_after_long_far_from_any_junction_too() -> None:
+    driven = drive(road(lanes_left=1), 170.0, speed=10.0, actors=[car(5, 45.0, speed=2.0, stays_from=12.0)])
+    assert np.abs(driven.states[:1200, 2]).max() < 0.2
+    assert driven.fronts[-1] > 200.0
