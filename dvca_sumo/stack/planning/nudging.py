@@ -12,6 +12,7 @@ from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length, feasib
 from dvca_sumo.stack.planning.reference import BEHIND, Window
 from dvca_sumo.stack.planning.scene import Flags, Scene
 
+_ENDS = np.array([0.0, -1.0, 1.0])[:, None]  # an object's middle, near and far end, in half lengths
 _PERSON, _STATIC = int(ObjectClass.PEDESTRIAN), int(ObjectClass.STATIC)
 _SEEN_LATE = 20.0  # [m] before the end of the window, objects are not yet decided about
 _ALONG = 1.0  # [m] kept lengthwise around an object before the ego moves back
@@ -44,7 +45,13 @@ class _Blocker(msgspec.Struct, frozen=True):
     high: float  # [m]
     right: float  # [m] offsets
     left: float  # [m]
+    swept_right: float  # [m] of the body where it passes the object, its rear axle on the line: negative
+    swept_left: float  # [m]
     wanted: float  # [m] sideways clearance
+
+    def clearance(self, offset: float) -> float:
+        """Between body and object, the ego passing at `offset` [m]; negative where they would overlap."""
+        return max(self.right - self.swept_left - offset, offset + self.swept_right - self.left)
 
 
 class Situation(msgspec.Struct, frozen=True, eq=False):
@@ -113,7 +120,10 @@ class NudgeDecider:
         wanted = np.where(scene.classes == _PERSON, config.person_clearance, config.nudge_clearance)
         is_held = np.array([track in self._held for track in scene.ids], dtype=np.bool_)
         is_beside = is_held & (now.stations - now.half_lengths < self._shape.front + _ALONG)
-        near = np.abs(now.offsets) < self._half + wanted + config.nudge_hold * is_held + now.half_widths
+        rows = window.index(now.stations + _ENDS * now.half_lengths)
+        swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
+        gaps = np.maximum(now.offsets - swept_left, swept_right - now.offsets) - now.half_widths
+        near = gaps < wanted + config.nudge_hold * is_held
         near &= scene.is_standing | is_beside
         near &= now.stations + now.half_lengths > -self._shape.rear_overhang - _ALONG
         near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
@@ -125,6 +135,8 @@ class NudgeDecider:
                 float(now.stations[row] + now.half_lengths[row]),
                 float(now.offsets[row] - now.half_widths[row]),
                 float(now.offsets[row] + now.half_widths[row]),
+                float(swept_right[row]),
+                float(swept_left[row]),
                 float(wanted[row]),
             )
             for row in near.nonzero()[0].tolist()
@@ -138,12 +150,12 @@ class NudgeDecider:
         """
         window = situation.window
         span = window.span(blocker.low - self._shape.front, blocker.high + self._shape.rear_overhang)
-        lane_left = float(window.lane_left[span].min()) + _OVER_LINE
-        lane_right = float(window.lane_right[span].max()) - _OVER_LINE
+        lane_left = float(window.lane_left[span].min()) - self._half + _OVER_LINE
+        lane_right = float(window.lane_right[span].max()) + self._half - _OVER_LINE
         held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
         offsets = self._candidates(blocker, window, span)
         for offset in sorted(offsets, key=lambda offset: (offset * held <= 0.0, abs(offset))):
-            stays_in_lane = lane_right + self._half <= offset <= lane_left - self._half
+            stays_in_lane = lane_right <= offset <= lane_left
             if self._meets_another(blocker, offset, situation.scene) or not (
                 stays_in_lane or self._may_leave_lane(blocker, offset, situation)
             ):
@@ -157,13 +169,12 @@ class NudgeDecider:
         room = self._half + self._config.edge_clearance
         leftmost = float(window.road_left[span].min()) - room
         rightmost = float(window.road_right[span].max()) + room
-        left = min(max(blocker.left + self._half + blocker.wanted, 0.0), leftmost)
-        right = max(min(blocker.right - self._half - blocker.wanted, 0.0), rightmost)
+        left = min(max(blocker.left - blocker.swept_right + blocker.wanted, 0.0), leftmost)
+        right = max(min(blocker.right - blocker.swept_left - blocker.wanted, 0.0), rightmost)
         return [offset for offset in (left, right) if self._clears(blocker, offset)]
 
     def _clears(self, blocker: _Blocker, offset: float) -> bool:
-        least = self._half + self._config.nudge_clearance_least
-        return offset >= blocker.left + least or offset <= blocker.right - least
+        return blocker.clearance(offset) >= self._config.nudge_clearance_least
 
     def _meets_another(self, blocker: _Blocker, offset: float, scene: Scene) -> bool:
         """Whether another standing object leaves no room at that offset, alongside this one."""
@@ -172,8 +183,9 @@ class NudgeDecider:
         high = blocker.high + self._shape.rear_overhang + now.half_lengths + _ALONG
         alongside = scene.is_standing & (now.stations > low) & (now.stations < high)
         alongside[blocker.row] = False
-        reach = now.half_widths + (self._half + self._config.nudge_clearance_least - 1e-6)
-        return bool((alongside & (np.abs(now.offsets - offset) < reach)).any())
+        gaps = np.maximum(now.offsets - offset - blocker.swept_left, blocker.swept_right + offset - now.offsets)
+        gaps -= now.half_widths + self._config.nudge_clearance_least - 1e-6
+        return bool((alongside & (gaps < 0.0)).any())
 
     def _may_leave_lane(self, blocker: _Blocker, offset: float, situation: Situation) -> bool:
         """For what will not move by itself, when the other lane is free; always to finish what was begun."""

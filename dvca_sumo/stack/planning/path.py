@@ -7,11 +7,10 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 import numpy.typing as npt
-from numpy.lib.stride_tricks import sliding_window_view
 
 from dvca_sumo.messages import Floats, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.reference import BEHIND, Window
+from dvca_sumo.stack.planning.reference import BEHIND, Window, swept
 from dvca_sumo.stack.planning.start import StartState
 
 _PEAK = 5.7735  # highest second derivative of a minimum-jerk blend of size 1 over length 1: 10 / sqrt(3)
@@ -112,15 +111,15 @@ def path_along(
     arcs = np.zeros(count)
     np.hypot(x[1:] - x[:-1], y[1:] - y[:-1]).cumsum(out=arcs[1:])
     headings = window.headings[ahead] + np.arctan(tangents)
-    left, right = _swept(x, y, headings, window, shape)
+    left, right = swept(x, y, headings, window.rows[:4, ahead], shape)
     return Path(
         x=x,
         y=y,
         headings=headings,
         curvatures=(curvatures + bends * squared_cosines / scale) * np.sqrt(squared_cosines) / scale,
         arcs=arcs,
-        left=left,
-        right=right,
+        left=np.concatenate((np.full(BEHIND, left[0]), left)),
+        right=np.concatenate((np.full(BEHIND, right[0]), right)),
     )
 
 
@@ -195,23 +194,3 @@ def _upper_terms(rise: float, first: float, second: float) -> tuple[float, float
     third = 10.0 * gap - 4.0 * slope_gap + 0.5 * bend_gap
     fourth = -15.0 * gap + 7.0 * slope_gap - bend_gap
     return third, fourth, 6.0 * gap - 3.0 * slope_gap + 0.5 * bend_gap
-
-
-def _swept(x: Floats, y: Floats, headings: Floats, window: Window, shape: VehicleShape) -> tuple[Floats, Floats]:
-    """Where the sides of the body pass each station: it is straight ahead of the rear axle, however the line bends."""
-    half, metres = 0.5 * shape.width, math.ceil(shape.front) + 1
-    count = len(x) - metres + 1
-    ahead = np.minimum(np.arange(metres, dtype=np.float64), shape.front)  # of the axle, each a station farther
-    line = window.rows[:4, BEHIND:]
-    axle = (y - line[1]) * line[2] - (x - line[0]) * line[3]
-    x_ahead, y_ahead, cosines, sines = sliding_window_view(line, metres, axis=1)
-    turned = headings[:count, None]
-    offsets = (y[:count, None] + ahead * np.sin(turned) - y_ahead) * cosines
-    offsets -= (x[:count, None] + ahead * np.cos(turned) - x_ahead) * sines
-    left = np.concatenate((np.full(BEHIND, axle[0]), axle))
-    right = left.copy()
-    for metre in range(1, metres):
-        part = slice(BEHIND + metre, BEHIND + metre + count)
-        np.maximum(left[part], offsets[:, metre], out=left[part])
-        np.minimum(right[part], offsets[:, metre], out=right[part])
-    return left + half, right - half

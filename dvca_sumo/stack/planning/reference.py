@@ -1,7 +1,10 @@
 """The route as the planner sees it from where the ego is: a window of reference line, 1 m between rows."""
 
+import math
+
 import msgspec
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from dvca_sumo.messages import Floats, Integers, VehicleShape
 from dvca_sumo.roadmap.route import Route
@@ -16,6 +19,7 @@ _CONVERGED = 1e-4  # [m]
 _NEAREST_CENTRE = 0.3  # of the distance to the centre of curvature, closest at which a point is still projected
 
 _X, _Y, _COS, _SIN, _HEADING, _CURVATURE, _LIMIT, _LANE_LEFT, _LANE_RIGHT, _ROAD_LEFT, _ROAD_RIGHT = range(11)
+_SWEPT_LEFT, _SWEPT_RIGHT, _COLUMNS = 11, 12, 13
 
 
 class Window(msgspec.Struct, frozen=True, eq=False):
@@ -25,7 +29,7 @@ class Window(msgspec.Struct, frozen=True, eq=False):
     """
 
     station: float  # [m] on the route
-    rows: Floats  # (11, n), all of the following
+    rows: Floats  # (13, n), all of the following
     x: Floats  # (n,) [m]
     y: Floats  # (n,) [m]
     cosines: Floats  # (n,) of the heading
@@ -37,6 +41,8 @@ class Window(msgspec.Struct, frozen=True, eq=False):
     lane_right: Floats  # (n,) [m]
     road_left: Floats  # (n,) [m]
     road_right: Floats  # (n,) [m]
+    swept_left: Floats  # (n,) [m] leftmost offset of the body, its rear axle on the line: farther out in bends
+    swept_right: Floats  # (n,) [m] rightmost
 
     def span(self, low: float, high: float) -> slice:
         """The rows from `low` to `high`, at least one."""
@@ -68,6 +74,7 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         rows[_LIMIT] = self.speed_limits
         rows[_LANE_LEFT], rows[_LANE_RIGHT] = 0.5 * width, -0.5 * width
         rows[_ROAD_LEFT], rows[_ROAD_RIGHT] = self.road_left - offsets, self.road_right - offsets
+        rows[_SWEPT_LEFT], rows[_SWEPT_RIGHT] = self.swept_left, self.swept_right
         return Window(self.station, rows, *rows)
 
     def project(self, points: Floats) -> tuple[Floats, Floats, Floats]:
@@ -108,7 +115,7 @@ class Reference:
         inside = np.clip(stations, 0.0, line.length)
         poses = line.poses(inside)
         outside = stations - inside
-        table = np.empty((11, len(stations)))
+        table = np.empty((_COLUMNS, len(stations)))
         table[_COS], table[_SIN], table[_HEADING] = np.cos(poses[:, 2]), np.sin(poses[:, 2]), poses[:, 2]
         table[_X] = poses[:, 0] + outside * table[_COS]
         table[_Y] = poses[:, 1] + outside * table[_SIN]
@@ -119,6 +126,8 @@ class Reference:
         table[_CURVATURE, outside != 0.0] = 0.0
         body = (-shape.rear_overhang - 1.0, shape.front + 1.0)
         table[_LIMIT] = _lowest_within(inside, line.stations, _limits(route, config), body)
+        line_rows = table[[_X, _Y, _COS, _SIN]]
+        table[_SWEPT_LEFT], table[_SWEPT_RIGHT] = swept(table[_X], table[_Y], table[_HEADING], line_rows, shape)
         self._table = table
         self._end = line.length + _BEYOND - _OUTLOOK
 
@@ -157,6 +166,28 @@ class Reference:
         rows *= first - whole
         rows += low[:, : high.shape[1]]
         return Window(station, rows, *rows)
+
+
+def swept(x: Floats, y: Floats, headings: Floats, line: Floats, shape: VehicleShape) -> tuple[Floats, Floats]:
+    """Where the sides of the body pass each station: leftmost and rightmost offset (n,) from the line [m].
+
+    The rear axle comes through poses (n,), one beside each of the rows x, y, cosine and sine of `line` (4, n), 1 m
+    apart. The body is straight ahead of the rear axle, however the line bends.
+    """
+    half, metres = 0.5 * shape.width, math.ceil(shape.front) + 1
+    count = len(x) - metres + 1
+    ahead = np.minimum(np.arange(metres, dtype=np.float64), shape.front)  # of the axle, each a station farther
+    axle = (y - line[1]) * line[2] - (x - line[0]) * line[3]
+    x_ahead, y_ahead, cosines, sines = sliding_window_view(line, metres, axis=1)
+    turned = headings[:count, None]
+    offsets = (y[:count, None] + ahead * np.sin(turned) - y_ahead) * cosines
+    offsets -= (x[:count, None] + ahead * np.cos(turned) - x_ahead) * sines
+    left, right = axle.copy(), axle
+    for metre in range(1, metres):
+        part = slice(metre, metre + count)
+        np.maximum(left[part], offsets[:, metre], out=left[part])
+        np.minimum(right[part], offsets[:, metre], out=right[part])
+    return left + half, right - half
 
 
 def _limits(route: Route, config: PlanningConfig) -> Floats:

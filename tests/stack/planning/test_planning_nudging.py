@@ -5,7 +5,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import SHAPE, Actor, Drive, assert_drivable, car, cone, drive, person, road, stop_line
+from planned_drives import SHAPE, Actor, Drive, assert_drivable, car, cone, curve_points, drive, person, road, stop_line
 
 from dvca_sumo.messages import ObjectClass
 from dvca_sumo.roadmap.route import Control
@@ -170,3 +170,16 @@ def test_car_that_was_seen_driving_is_passed_only_after_long_far_from_any_juncti
     driven = drive(road(lanes_left=1), 170.0, speed=10.0, actors=[car(5, 45.0, speed=2.0, stays_from=12.0)])
     assert np.abs(driven.states[:1200, 2]).max() < 0.2
     assert driven.fronts[-1] > 200.0
+
+
+@pytest.mark.parametrize("station", [63.0, 66.0, 69.0])
+@pytest.mark.parametrize("radius", [8.0, 14.0])
+def test_person_on_the_outside_of_a_tight_bend_is_passed_with_room_for_the_body_that_swings_out(
+    radius: float, station: float
+) -> None:
+    route = road(curve_points(radius, before=60.0), lanes_left=1)
+    x, y, heading = route.line.poses(np.array([station]))[0].tolist()
+    beside = person(3, x + 1.5 * math.sin(heading), y - 1.5 * math.cos(heading))
+    driven = drive(route, 30.0, speed=5.0, station=30.0, actors=[beside])
+    assert driven.clearances.min() > 1.1
+    assert driven.states[-1, 2] > 100.0
