@@ -20,6 +20,7 @@ _IN_LANE = 1.2  # [m] vehicles whose centre is this near the line are in our lan
 _OVER_LINE = 0.1  # [m] over the lane marking is not yet another lane
 _COMMITTED = 0.5  # of the offset: from there on it is safer to go on than to go back
 _SLOWEST = 3.0  # [m/s] assumed of the ego when it passes
+_DRIVING = 1.0  # [s] of moving: what is seen first may seem to move for less
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane
 _CLOSING = 2.0  # [s] of closing speed kept to those who come from behind
 
@@ -73,6 +74,7 @@ class NudgeDecider:
         self._config = config
         self._half = 0.5 * shape.width
         self._since: dict[int, float] = {}  # by track: when it came to stand
+        self._moving: dict[int, float] = {}  # by track: when it came to move
         self._driven: set[int] = set()  # tracks that were seen driving
         self._held: dict[int, Plateau] = {}  # by track: the last cycle's, in route stations
 
@@ -85,9 +87,11 @@ class NudgeDecider:
         """The nudges of this cycle by station; objects without one are passed by staying in lane, or stopped for."""
         scene, station = situation.scene, situation.window.station
         standing = [scene.ids[row] for row in scene.is_standing.nonzero()[0].tolist()]
-        self._driven &= set(scene.ids)
-        self._driven.update(scene.ids[row] for row in (~scene.is_standing).nonzero()[0].tolist())
+        moving = [scene.ids[row] for row in (~scene.is_standing).nonzero()[0].tolist()]
         self._since = {track: self._since.get(track, situation.time) for track in standing}
+        self._moving = {track: self._moving.get(track, situation.time) for track in moving}
+        self._driven &= set(scene.ids)
+        self._driven.update(track for track, since in self._moving.items() if situation.time - since > _DRIVING)
         nudges = []
         for blocker in self._blockers(scene, situation.window) if standing or self._held else ():
             offset = self._offset(blocker, situation)

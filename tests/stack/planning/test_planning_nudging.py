@@ -172,6 +172,13 @@ def test_car_that_was_seen_driving_is_passed_only_after_long_far_from_any_juncti
     assert driven.fronts[-1] > 200.0
 
 
+def test_car_that_only_seemed_to_move_when_first_seen_is_passed_as_a_parked_one() -> None:
+    seemed = car(5, 119.0, speed=2.0, stays_from=0.5)
+    driven = drive(road(lanes_left=1), 30.0, speed=13.0, actors=[seemed])
+    assert driven.fronts[-1] > 200.0
+    assert driven.clearances.min() > 0.4
+
+
 @pytest.mark.parametrize("station", [63.0, 66.0, 69.0])
 @pytest.mark.parametrize("radius", [8.0, 14.0])
 def test_person_on_the_outside_of_a_tight_bend_is_passed_with_room_for_the_body_that_swings_out(
