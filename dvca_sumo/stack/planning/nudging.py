@@ -38,10 +38,11 @@ class Nudge(msgspec.Struct, frozen=True):
 
 
 class _Blocker(msgspec.Struct, frozen=True):
-    """A standing object in or close to the way, in window coordinates."""
+    """A standing object in or close to the way, in window coordinates; or one that starts while it is passed."""
 
     track: int
     row: int  # in the scene
+    speed: float  # [m/s]
     low: float  # [m] stations
     high: float  # [m]
     right: float  # [m] offsets
@@ -93,7 +94,7 @@ class NudgeDecider:
         self._driven &= set(scene.ids)
         self._driven.update(track for track, since in self._moving.items() if situation.time - since > _DRIVING)
         nudges = []
-        for blocker in self._blockers(scene, situation.window) if standing or self._held else ():
+        for blocker in self._blockers(situation) if standing or self._held else ():
             offset = self._offset(blocker, situation)
             if offset is not None:
                 nudges.append(Nudge(blocker.track, self._plateau(blocker, offset, situation)))
@@ -108,6 +109,7 @@ class NudgeDecider:
         """Where the offset has to be reached and left; a move once begun later than that ends where it did before."""
         begin = blocker.low - self._shape.front - _ALONG
         end = blocker.high + self._shape.rear_overhang + _ALONG
+        end += blocker.speed * end / max(situation.speed - blocker.speed, _SLOWEST)
         held = self._held.get(blocker.track)
         if held is not None and held.offset == offset:
             begin = max(begin, held.begin - situation.window.station)
@@ -115,15 +117,19 @@ class NudgeDecider:
             begin = max(begin, feasible_length(situation.lateral, offset, begin, situation.speed, self._config))
         return Plateau(begin, max(end, begin), offset)
 
-    def _blockers(self, scene: Scene, window: Window) -> list[_Blocker]:
+    def _blockers(self, situation: Situation) -> list[_Blocker]:
         """Objects that the ego, centred in its lane, would pass with less than the wanted clearance.
 
-        They stand; who starts to move while the ego is beside them is passed all the same, or passes the ego.
+        They stand; who starts to move when the ego is beside them, or too near to fall in behind them in comfort, is
+        passed all the same, or passes the ego.
         """
-        now, config = scene.now, self._config
+        scene, window, now, config = situation.scene, situation.window, situation.scene.now, self._config
         wanted = np.where(scene.classes == _PERSON, config.person_clearance, config.nudge_clearance)
         is_held = np.array([track in self._held for track in scene.ids], dtype=np.bool_)
-        is_beside = is_held & (now.stations - now.half_lengths < self._shape.front + _ALONG)
+        speeds = np.where(scene.is_standing, 0.0, scene.speeds)
+        closing = np.maximum(situation.speed - speeds, 0.0)
+        way = closing * closing / (2.0 * config.comfort_braking) + _ALONG
+        is_beside = is_held & (now.stations - now.half_lengths < self._shape.front + way)
         rows = window.index(now.stations + _ENDS * now.half_lengths)
         swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
         gaps = np.maximum(now.offsets - swept_left, swept_right - now.offsets) - now.half_widths
@@ -135,6 +141,7 @@ class NudgeDecider:
             _Blocker(
                 scene.ids[row],
                 row,
+                float(speeds[row]),
                 float(now.stations[row] - now.half_lengths[row]),
                 float(now.stations[row] + now.half_lengths[row]),
                 float(now.offsets[row] - now.half_widths[row]),

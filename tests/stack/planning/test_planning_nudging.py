@@ -190,3 +190,12 @@ def test_person_on_the_outside_of_a_tight_bend_is_passed_with_room_for_the_body_
     driven = drive(route, 30.0, speed=5.0, station=30.0, actors=[beside])
     assert driven.clearances.min() > 1.1
     assert driven.states[-1, 2] > 100.0
+
+
+@pytest.mark.parametrize("leaves", [5.0, 6.0, 7.0])
+def test_who_starts_when_the_ego_is_about_to_pass_is_passed_or_followed_without_a_touch(leaves: float) -> None:
+    bus = car(5, 120.0, -0.6, size=(12.0, 2.5), speed=3.0, leaves=leaves)
+    driven = drive(road(lanes_left=1), 30.0, speed=13.0, actors=[bus])
+    assert driven.clearances.min() > 0.4
+    assert driven.states[:, 5].min() > -4.0
+    assert_drivable(driven)
