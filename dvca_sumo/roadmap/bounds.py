@@ -50,7 +50,7 @@ def lane_change(line: Polyline, change: Change) -> LaneChange:
     """Where the lanes of `change`, whose stations are on `line`, run beside it."""
     first, last = np.searchsorted(line.stations, (change.begin, change.latest))
     rows = slice(int(first), max(int(last), int(first)) + 1)
-    offsets = np.stack([_evened(_centre(line, lane, rows)) for lane in change.lanes])
+    offsets = np.stack([evened(_centre(line, lane, rows)) for lane in change.lanes])
     offsets.setflags(write=False)
     return LaneChange(
         lanes=tuple(lane.id for lane in change.lanes),
@@ -62,7 +62,7 @@ def lane_change(line: Polyline, change: Change) -> LaneChange:
     )
 
 
-def _evened(offsets: Floats) -> Floats:
+def evened(offsets: Floats) -> Floats:
     """Without the kinks of the net's shapes, at points 1 m apart; both ends stay where they are."""
     reach = min(_EVENED, len(offsets) - 1)
     kernel = np.hanning(2 * reach + 3)[1:-1]

@@ -73,6 +73,20 @@ class LaneChange(msgspec.Struct, frozen=True, eq=False):
         return int(np.abs(self.centres(np.array([station]))[:, 0] - offset).argmin())
 
 
+class PassingLane(msgspec.Struct, frozen=True, eq=False):
+    """A lane beside the route's own for a while, all along which the ego may pass who is slow, and come back."""
+
+    lane_ids: tuple[str, ...]  # (n,) junctions that it runs across make it more than one
+    widths: tuple[float, float]  # [m] of it and of the route's own, where they are narrowest
+    stations: Floats  # (n,) [m]
+    offsets: Floats  # (n,) [m] of its centre from the line
+    leads_on: bool  # where the route goes afterwards, too: a queue on the route's own lane alone is for another way
+
+    def covers(self, station: float) -> bool:
+        """Whether it is there at `station` [m]."""
+        return bool(self.stations[0] <= station <= self.stations[-1])
+
+
 class Overpass(msgspec.Struct, frozen=True, eq=False):
     """A lane that passes over or under the route: who is on it does not meet the ego there."""
 
@@ -110,8 +124,28 @@ class Route(msgspec.Struct, frozen=True, eq=False):
     crossings: tuple[Crossing, ...]  # by station
     unmapped_limits: tuple[UnmappedLimit, ...] = ()  # by station
     lane_changes: tuple[LaneChange, ...] = ()  # by station
+    passing_lanes: tuple[PassingLane, ...] = ()  # by station
     overpasses: tuple[Overpass, ...] = ()  # by station
 
     def lane_change_at(self, station: float) -> LaneChange | None:
         """The change of lanes that is to be done at `station` [m], if there is one."""
         return next((one for one in self.lane_changes if one.start_station <= station <= one.latest_station), None)
+
+    def passing_lane_at(self, station: float) -> PassingLane | None:
+        """The lane to pass on at `station` [m], if there is one."""
+        return next((one for one in self.passing_lanes if one.covers(station)), None)
+
+    def lane_at(self, station: float, offset: float) -> str:
+        """Of the lanes that the ego may be on at `station` [m], the one with its centre nearest to `offset` [m]."""
+        change, passing = self.lane_change_at(station), self.passing_lane_at(station)
+        if change is None:
+            row = int(self.line.stations.searchsorted(station, side="right")) - 1
+            own, aside = self.lane_ids[row], offset
+        else:
+            nearest = change.nearest(station, offset)
+            own, aside = change.lanes[nearest], offset - float(change.centres(np.array([station]))[nearest, 0])
+        if passing is not None:
+            row = int(passing.stations.searchsorted(station, side="right")) - 1
+            if abs(offset - float(passing.offsets[row])) < abs(aside):
+                return passing.lane_ids[row]
+        return own

@@ -10,6 +10,7 @@ from dvca_sumo.roadmap.bounds import Bounds, bounds, lane_change
 from dvca_sumo.roadmap.drawing import Change, Drawing, Stretch
 from dvca_sumo.roadmap.lane_sequence import Leg, change_length, lane_sequence
 from dvca_sumo.roadmap.lanes import Lane, Movement
+from dvca_sumo.roadmap.passing import passing_lanes
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.right_of_way import crossings, stop_line
 from dvca_sumo.roadmap.route import Route, RouteError, UnmappedLimit
@@ -61,6 +62,13 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
         for passage in plan.passages
         if begin <= passage.begin < end
     ]
+    changes = [change for change in _changes(plan, line, along) if change.latest > change.begin]
+    crossed = tuple(crossing for p in passages for crossing in crossings(net, p.movement, line, p.begin, p.end))
+    departure, destination = moved(plan.start), moved(plan.destination)
+    is_closed = (line.stations < departure) | (line.stations > destination)
+    busy = [(one.begin, one.end) for one in changes] + [(one.start_station, one.end_station) for one in crossed]
+    for low, high in busy:
+        is_closed |= (line.stations >= low) & (line.stations <= high)
     return Route(
         line=line,
         lane_ids=tuple(lane.id for lane in followed),
@@ -70,18 +78,17 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
         lane_right=edges_of.lane_right,
         road_left=edges_of.road_left,
         road_right=edges_of.road_right,
-        start=moved(plan.start),
-        destination=moved(plan.destination),
+        start=departure,
+        destination=destination,
         stop_lines=tuple(stop_line(net, p.movement, p.begin, p.end) for p in passages),
-        crossings=tuple(crossing for p in passages for crossing in crossings(net, p.movement, line, p.begin, p.end)),
+        crossings=crossed,
         unmapped_limits=tuple(
             UnmappedLimit(float(line.stations[rows.start]), float(line.stations[rows.stop - 1]), lane.is_motorway)
             for lane, rows in runs(followed)
             if not lane.is_limit_mapped
         ),
-        lane_changes=tuple(
-            lane_change(line, change) for change in _changes(plan, line, along) if change.latest > change.begin
-        ),
+        lane_changes=tuple(lane_change(line, change) for change in changes),
+        passing_lanes=passing_lanes(net, line, followed, is_closed),
     )
 
 

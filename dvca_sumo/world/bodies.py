@@ -6,7 +6,7 @@ from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.messages import VehicleShape
 from dvca_sumo.roadmap import Route
 from dvca_sumo.truth import EgoTruth
-from dvca_sumo.world.entry import Entry, departure, row_at
+from dvca_sumo.world.entry import Entry, departure
 from dvca_sumo.world.session import Motion
 from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
 
@@ -47,13 +47,10 @@ class Ego:
         """The route's lane under its front bumper, for SUMO's map matching."""
         line = self.route.line
         front = min(self.station() + self.shape.front, line.length)
-        change = self.route.lane_change_at(front)
-        if change is None:
-            return self.route.lane_ids[row_at(self.route, front)]
         truth, reach = self.vehicle.truth, self.shape.front
         nose = (truth.x + reach * math.cos(truth.heading), truth.y + reach * math.sin(truth.heading))
         _, offsets = line.project([nose], between=(front - reach, front + reach))
-        return change.lanes[change.nearest(front, float(offsets[0]))]
+        return self.route.lane_at(front, float(offsets[0]))
 
     def indicated(self, lane: str) -> int:
         """Which way it indicates, on `lane`: 1 left, -1 right, 0 neither.

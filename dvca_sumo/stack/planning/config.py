@@ -69,6 +69,13 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     change_time: float = 3.0  # [s] in which the ego falls back beside a gap
     change_outlook: float = 50.0  # [m] before it can begin, gaps are looked for
 
+    # Passing who is slow on the next lane.
+    passing_gain: float = 2.0  # [m/s] one gets on faster there
+    passing_slowest: float = 8.0  # [m/s] slower ones are a queue, may be one for where the ego goes
+    passing_outlook: float = 4.0  # [s] at the speed wanted, ahead of which others are looked at
+    passing_room: float = 12.0  # [s] at the speed wanted, that there is still room to come back
+    return_room: float = 10.0  # [s] of room left, from where on the ego comes back
+
     # Whose turn it is.
     likely: float = 0.2  # probability from which a hypothesis counts
     possible: float = 0.05  # probability from which it counts when it happens within `soon`

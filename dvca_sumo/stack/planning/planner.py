@@ -21,6 +21,7 @@ from dvca_sumo.stack.planning.lane_changing import LaneChanger, LaneChoice
 from dvca_sumo.stack.planning.limits import nearest_stop, speed_caps
 from dvca_sumo.stack.planning.meeting import Demand, Meetings
 from dvca_sumo.stack.planning.nudging import Nudge, NudgeDecider, Situation
+from dvca_sumo.stack.planning.passing import Passing
 from dvca_sumo.stack.planning.path import Path, lateral_start, path_along
 from dvca_sumo.stack.planning.reference import BEHIND, Reference
 from dvca_sumo.stack.planning.scene import scene_in
@@ -47,6 +48,7 @@ class Planner:
         self._destination = stop_station(route, config)
         self._junctions = Junctions(route, config)
         self._lane_changer = LaneChanger(route, shape, config)
+        self._passing = Passing(route, shape, config)
         self._nudging = NudgeDecider(shape, config)
         self._meetings = Meetings(shape, config)
         self._previous: Trajectory | None = None
@@ -102,7 +104,9 @@ class Planner:
         station, offset = located
         config, shape = self._config, self._shape
         window = self._reference.window(station, self._reach(station, start.speed))
-        choice = self._lane_changer.step(window, offset, start.speed, predicted.objects)
+        choice = self._passing.step(window, offset, start.speed, predicted.objects)
+        if choice is None:
+            choice = self._lane_changer.step(window, offset, start.speed, predicted.objects)
         if choice.keeping is not None:
             window = window.moved(choice.keeping.offsets, choice.keeping.width)
             offset -= float(choice.keeping.offsets[BEHIND])
@@ -136,7 +140,7 @@ class Planner:
         stops = [nearest_stop(to_destination, graph, views, leader, shape, config)]
         if choice.keeping is not None:
             stops.append(choice.keeping.stop)
-            caps = [min(cap, choice.keeping.pace) for cap in caps]
+        caps = [min(cap, choice.pace) for cap in caps]
         profile = roll_out(start.speed, start.acceleration, caps, stops, leader, config)
         demands: dict[int, Demand] = {}
         for _ in range(_ROUNDS):

@@ -1,0 +1,107 @@
+"""Gaps between those who drive on a lane beside the ego's.
+
+They are told by what has to brake how hard (as in MOBIL: Kesting, Treiber, Helbing, General lane-changing
+model, 2007).
+"""
+
+import math
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.geometry.polyline import Polyline
+from dvca_sumo.messages import Floats, ObjectClass, TrackedObjects, VehicleShape
+from dvca_sumo.roadmap.route import LaneChange
+from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.reference import Window
+
+_PERSON = int(ObjectClass.PEDESTRIAN)
+LAST_SPEED = 3.0  # [m/s] at which a change in the last moment is done
+_SLOWEST = 2.0  # [m/s] beside a gap ...
+_FALLING_BACK = 5.0  # [m/s] ... and for one that is yet to come, which the ego does not wait for before it has to
+_SEEN = 120.0  # [m] before and behind the ego
+_CATCHES_UP = 0.8  # of the ego's speed: slower ones are come up to ...
+_FORWARD = 3.0  # ... while a gap beside faster ones is that much harder to get to than one farther back
+
+
+class Neighbours(msgspec.Struct, frozen=True, eq=False):
+    """Who drives or stands on one lane, from front to back."""
+
+    rears: Floats  # (m,) [m] stations
+    fronts: Floats  # (m,) [m]
+    speeds: Floats  # (m,) [m/s]
+    tracks: list[int]  # (m,)
+
+
+class Gaps:
+    """What lanes beside the line look like to an ego that may change to them."""
+
+    def __init__(self, line: Polyline, shape: VehicleShape, config: PlanningConfig) -> None:
+        self._line = line
+        self._shape = shape
+        self._config = config
+
+    def occupied(self, change: LaneChange, here: float, objects: TrackedObjects) -> list[Neighbours]:
+        """For each lane of the change, who is on it or partly so; places count from the station `here` [m]."""
+        boxes, velocities = objects.boxes, objects.velocities
+        stations, offsets = self._line.project(boxes[:, :2], between=(here - _SEEN, here + _SEEN))
+        headings = self._line.poses(stations)[:, 2]
+        angles = boxes[:, 2] - headings
+        cosines, sines = np.abs(np.cos(angles)), np.abs(np.sin(angles))
+        lengths = 0.5 * (boxes[:, 3] * cosines + boxes[:, 4] * sines)
+        widths = 0.5 * (boxes[:, 3] * sines + boxes[:, 4] * cosines)
+        speeds = velocities[:, 0] * np.cos(headings) + velocities[:, 1] * np.sin(headings)
+        is_there = (objects.classes != _PERSON) & (stations < change.latest_station)
+        found = []
+        for centre in change.centres(stations):
+            rows = np.flatnonzero(is_there & (np.abs(offsets - centre) < widths + 0.5 * self._shape.width))
+            rows = rows[np.argsort(-stations[rows], kind="stable")]
+            places, halves = stations[rows] - here, lengths[rows]
+            found.append(Neighbours(places - halves, places + halves, speeds[rows], objects.ids[rows].tolist()))
+        return found
+
+    def is_free(
+        self, lane: Neighbours, change: LaneChange, window: Window, speed: float, headway: float, braking: float
+    ) -> bool:
+        """Whether nobody on the lane has to brake harder than `braking` [m/s^2] when the ego is there.
+
+        That is where the change can begin, those on the lane keeping their speeds until then. Who follows
+        whom is to be `headway` [s] behind.
+        """
+        if not lane.tracks:
+            return True
+        shape = self._shape
+        ahead = max(change.start_station - window.station - shape.front, 0.0)
+        wait = ahead / max(speed, LAST_SPEED)
+        rears, fronts = lane.rears + lane.speeds * wait, lane.fronts + lane.speeds * wait
+        nose, tail = ahead + shape.front, ahead - shape.rear_overhang
+        closing = speed - lane.speeds
+        is_ahead = 0.5 * (rears + fronts) > 0.5 * (nose + tail)
+        gaps = np.where(is_ahead, rears - nose, tail - fronts)
+        closing = np.where(is_ahead, closing, -closing)
+        followers = np.where(is_ahead, speed, lane.speeds)
+        needed = self._config.change_gap + headway * followers + np.square(np.maximum(closing, 0.0)) / (2.0 * braking)
+        return bool((gaps >= needed).all())
+
+    def pace(self, lane: Neighbours, change: LaneChange, window: Window, speed: float) -> float:
+        """The speed that brings the ego behind the nearest one on the lane who has room behind [m/s]."""
+        config, shape = self._config, self._shape
+        if not lane.tracks or change.start_station - window.station > config.change_outlook:
+            return math.inf
+        wanted = lane.rears - config.change_gap - config.change_headway * speed  # for the nose, behind each
+        has_room = np.ones(len(wanted), dtype=np.bool_)
+        has_room[:-1] = wanted[:-1] - shape.length - lane.fronts[1:] >= (
+            config.change_gap + config.change_headway * lane.speeds[1:]
+        )
+        shifts = wanted - shape.front
+        ahead = max(change.start_station - window.station - shape.front, 0.0)
+        is_in_reach = has_room & ((lane.speeds > config.moving_speed) | (shifts >= ahead))
+        if not is_in_reach.any():
+            return math.inf
+        is_faster = lane.speeds > _CATCHES_UP * speed
+        efforts = np.where(shifts > 0.0, np.where(is_faster, _FORWARD, 1.0) * shifts, -shifts)
+        slot = int(np.where(is_in_reach, efforts, np.inf).argmin())
+        shift, pace = float(shifts[slot]), float(lane.speeds[slot])
+        if shift < 0.0:
+            return max(pace + shift / config.change_time, _FALLING_BACK)
+        return max(pace + math.sqrt(2.0 * config.change_braking * shift), _SLOWEST)

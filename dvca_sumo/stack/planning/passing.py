@@ -1,0 +1,100 @@
+"""Passing who is slow on the next lane, and coming back: changes of lane that the route does not need.
+
+As in MOBIL (Kesting, Treiber, Helbing, General lane-changing model, 2007) there has to be something to gain, and
+room for it.
+"""
+
+import math
+
+import numpy as np
+
+from dvca_sumo.messages import TrackedObjects, VehicleShape
+from dvca_sumo.roadmap.route import LaneChange, PassingLane, Route
+from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.lane_changing import (
+    ARRIVED,
+    OVER,
+    LaneChoice,
+    is_last_chance,
+    keeping,
+    last_stop,
+    letting_in,
+)
+from dvca_sumo.stack.planning.lane_gaps import Gaps, Neighbours
+from dvca_sumo.stack.planning.reference import BEHIND, Window
+
+_BESIDE, _OWN = 0, 1  # lanes of the way back
+
+
+class Passing:
+    """Decides at each lane to pass on whether to be on it."""
+
+    def __init__(self, route: Route, shape: VehicleShape, config: PlanningConfig) -> None:
+        self._lanes = route.passing_lanes
+        self._ways_back = [_way_back(lane) for lane in route.passing_lanes]
+        self._gaps = Gaps(route.line, shape, config)
+        self._shape = shape
+        self._config = config
+        self._next = 0  # row of the lane to pass on that the ego is beside, or comes to
+        self._lane = self._target = _OWN  # that the ego is on, and is to be on
+
+    def step(self, window: Window, offset: float, speed: float, objects: TrackedObjects) -> LaneChoice | None:
+        """As `LaneChanger.step`; None where the ego is on the route's own lane, and stays there."""
+        nose, ways = window.station + self._shape.front, self._ways_back
+        while self._next < len(ways) and nose >= ways[self._next].latest_station:
+            self._next, self._lane, self._target = self._next + 1, _OWN, _OWN
+        if self._next == len(ways) or window.station < ways[self._next].start_station:
+            return None
+        return self._choice(ways[self._next], window, offset, speed, objects)
+
+    def _choice(
+        self, way: LaneChange, window: Window, offset: float, speed: float, objects: TrackedObjects
+    ) -> LaneChoice | None:
+        config, shape = self._config, self._shape
+        aside = np.abs(offset - way.centres(np.array([window.station]))[:, 0])
+        if aside[self._target] < ARRIVED:
+            self._lane = self._target
+        wanted = config.cruise_fraction * float(window.speed_limits[BEHIND])
+        left = way.latest_station - window.station - shape.front
+        if self._lane == self._target == _OWN and (left < config.passing_room * wanted or aside[_OWN] > ARRIVED):
+            return None
+        occupied = self._gaps.occupied(way, window.station, objects)
+        stop = last_stop(way, window, 1, speed, shape, config)
+        is_late = left < config.return_room * speed
+        beside, own = (self._pace_on(lane, wanted) for lane in occupied)
+        is_queue = own < config.passing_slowest
+        wish = self._target
+        if self._lane == self._target == _BESIDE and (is_late or own >= beside):
+            wish = _OWN
+        elif self._lane == self._target == _OWN and beside > own + config.passing_gain:
+            wish = _BESIDE if self._lanes[self._next].leads_on or not is_queue else _OWN
+        target = wish
+        if target != self._lane:
+            is_pressed = self._lane != self._target or is_last_chance(stop, speed)
+            room = (0.0, config.comfort_braking) if is_pressed else (config.change_headway, config.change_braking)
+            is_over = aside[self._lane] > 0.5 * (way.widths[self._lane] - shape.width) + OVER
+            if not is_over and not self._gaps.is_free(occupied[target], way, window, speed, *room):
+                target = self._lane
+        pace = math.inf
+        if target != wish and (is_late or is_queue):
+            pace = self._gaps.pace(occupied[wish], way, window, speed)
+        behind = letting_in([occupied[target]], shape) if target != self._lane else frozenset()
+        self._target = target
+        if target == _BESIDE:
+            return LaneChoice(keeping(way, _BESIDE, window, stop), behind, pace)
+        if self._lane == target == wish:
+            return None
+        return LaneChoice(None, behind, pace)
+
+    def _pace_on(self, lane: Neighbours, wanted: float) -> float:
+        """How fast one gets on where the ego has come to the next ones on the lane [m/s]."""
+        reach = self._config.passing_outlook * wanted
+        ahead = lane.rears - self._shape.front
+        return float(lane.speeds[(ahead > 0.0) & (ahead < reach)].min(initial=wanted))
+
+
+def _way_back(passing: PassingLane) -> LaneChange:
+    """From the lane to pass on to the route's own, anywhere along it."""
+    offsets = np.stack((passing.offsets, np.zeros_like(passing.offsets)))
+    first, last = float(passing.stations[0]), float(passing.stations[-1])
+    return LaneChange(passing.lane_ids[:1] * 2, passing.widths, first, last, passing.stations, offsets)
