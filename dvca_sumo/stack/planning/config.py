@@ -72,7 +72,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     # Passing who is slow on the next lane.
     passing_gain: float = 2.0  # [m/s] one gets on faster there
     passing_slowest: float = 8.0  # [m/s] slower ones are a queue, may be one for where the ego goes
-    passing_outlook: float = 4.0  # [s] at the speed wanted, ahead of which others are looked at
+    passing_outlook: float = 8.0  # [s] in which one would be caught up with
     passing_room: float = 12.0  # [s] at the speed wanted, that there is still room to come back
     return_room: float = 10.0  # [s] of room left, from where on the ego comes back
 

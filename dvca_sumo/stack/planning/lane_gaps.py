@@ -51,7 +51,7 @@ class Gaps:
         lengths = 0.5 * (boxes[:, 3] * cosines + boxes[:, 4] * sines)
         widths = 0.5 * (boxes[:, 3] * sines + boxes[:, 4] * cosines)
         speeds = velocities[:, 0] * np.cos(headings) + velocities[:, 1] * np.sin(headings)
-        is_there = (objects.classes != _PERSON) & (stations < change.latest_station)
+        is_there = (objects.classes != _PERSON) & (stations < change.latest_station) & (np.abs(stations - here) < _SEEN)
         found = []
         for centre in change.centres(stations):
             rows = np.flatnonzero(is_there & (np.abs(offsets - centre) < widths + 0.5 * self._shape.width))

@@ -24,6 +24,7 @@ from dvca_sumo.stack.planning.lane_gaps import Gaps, Neighbours
 from dvca_sumo.stack.planning.reference import BEHIND, Window
 
 _BESIDE, _OWN = 0, 1  # lanes of the way back
+_LONGER = 2.0  # that the next lane is to be the faster one
 
 
 class Passing:
@@ -61,7 +62,8 @@ class Passing:
         occupied = self._gaps.occupied(way, window.station, objects)
         stop = last_stop(way, window, 1, speed, shape, config)
         is_late = left < config.return_room * speed
-        beside, own = (self._pace_on(lane, wanted) for lane in occupied)
+        beside = self._pace_on(occupied[_BESIDE], wanted, _LONGER * config.passing_outlook)
+        own = self._pace_on(occupied[_OWN], wanted, config.passing_outlook)
         is_queue = own < config.passing_slowest
         wish = self._target
         if self._lane == self._target == _BESIDE and (is_late or own >= beside):
@@ -86,11 +88,11 @@ class Passing:
             return None
         return LaneChoice(None, behind, pace)
 
-    def _pace_on(self, lane: Neighbours, wanted: float) -> float:
-        """How fast one gets on where the ego has come to the next ones on the lane [m/s]."""
-        reach = self._config.passing_outlook * wanted
+    def _pace_on(self, lane: Neighbours, wanted: float, outlook: float) -> float:
+        """How fast the slowest is whom the ego, at the speed `wanted`, catches up with within `outlook` [s] [m/s]."""
         ahead = lane.rears - self._shape.front
-        return float(lane.speeds[(ahead > 0.0) & (ahead < reach)].min(initial=wanted))
+        is_met = (ahead > 0.0) & (ahead < outlook * (wanted - lane.speeds))
+        return float(lane.speeds[is_met].min(initial=wanted))
 
 
 def _way_back(passing: PassingLane) -> LaneChange:

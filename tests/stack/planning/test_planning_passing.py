@@ -1,0 +1,95 @@
+"""Passing on the next lane: where there is something to gain, a gap, and room to come back."""
+
+import msgspec
+import numpy as np
+import pytest
+from planned_drives import Actor, Drive, assert_drivable, car, drive, road, straight_points
+
+from dvca_sumo.roadmap import Route
+from dvca_sumo.roadmap.route import PassingLane
+
+WIDTH = 3.2  # [m] of a lane
+END = 900.0  # [m] of the lane to pass on
+
+
+def beside(*, leads_on: bool = True, end: float = END, side: int = 1) -> Route:
+    """Straight along x, with a lane to pass on at the left (side 1) or right (-1)."""
+    found = road(straight_points(1200.0), lanes_left=1 if side > 0 else 0)
+    if side < 0:
+        found = msgspec.structs.replace(found, road_right=found.road_right - WIDTH)
+    stations = found.line.stations[found.line.stations <= end]
+    lane = PassingLane(
+        lane_ids=("ego_1",) * len(stations),
+        widths=(WIDTH, WIDTH),
+        stations=stations,
+        offsets=np.full(len(stations), side * WIDTH),
+        leads_on=leads_on,
+    )
+    return msgspec.structs.replace(found, passing_lanes=(lane,))
+
+
+def queue(speed: float) -> list[Actor]:
+    """Cars that creep along the ego's lane from 300 m on."""
+    return [car(1000 + number, 300.0 + 8.0 * number, speed=speed) for number in range(12)]
+
+
+def lanes(driven: Drive) -> list[int]:
+    """The lanes the ego's middle was on, one after the other; 0 is its own."""
+    on = np.rint(driven.states[:, 2] / WIDTH).astype(int)
+    return [int(lane) for lane in on[np.concatenate(([True], on[1:] != on[:-1]))]]
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_who_is_slow_is_passed_and_the_ego_comes_back(side: int) -> None:
+    driven = drive(beside(side=side), 60.0, speed=13.0, actors=[car(7, 80.0, speed=8.5)])
+    assert lanes(driven) == [0, side, 0]
+    assert driven.clearances.min() > 1.0
+    assert driven.speeds.min() > 10.0
+    assert_drivable(driven)
+
+
+def test_who_is_as_fast_is_followed() -> None:
+    driven = drive(beside(), 40.0, speed=13.0, actors=[car(7, 60.0, speed=12.5)])
+    assert lanes(driven) == [0]
+
+
+@pytest.mark.parametrize("leads_on", [True, False])
+def test_a_queue_is_passed_where_it_cannot_be_for_where_the_ego_goes(leads_on: bool) -> None:
+    driven = drive(beside(leads_on=leads_on), 60.0, speed=13.0, actors=queue(1.0))
+    assert lanes(driven) == ([0, 1, 0] if leads_on else [0])
+    assert driven.clearances.min() > 1.0
+
+
+def test_nobody_is_passed_where_there_is_no_room_to_come_back() -> None:
+    driven = drive(beside(end=180.0), 40.0, speed=13.0, actors=[car(7, 80.0, speed=8.5)])
+    assert lanes(driven) == [0]
+
+
+def test_nobody_is_passed_on_a_lane_that_is_as_slow() -> None:
+    slow = [car(7, 80.0, speed=8.5), car(8, 90.0, WIDTH, speed=9.0)]
+    assert lanes(drive(beside(), 40.0, speed=13.0, actors=slow)) == [0]
+
+
+def test_who_comes_up_fast_from_behind_on_the_next_lane_goes_first() -> None:
+    driven = drive(beside(), 60.0, speed=13.0, actors=[car(7, 80.0, speed=8.0), car(8, -20.0, WIDTH, speed=18.0)])
+    fast = -20.0 + 18.0 * driven.states[:, 0]
+    is_over = np.abs(driven.states[:, 2]) > 1.0
+    assert is_over.any()
+    assert fast[is_over.argmax()] > driven.fronts[is_over.argmax()]
+    assert driven.clearances.min() > 1.0
+
+
+def test_beside_dense_traffic_it_slows_down_in_time_for_a_gap_past_the_queue() -> None:
+    platoon = [car(number, 40.0 - 18.0 * number, WIDTH, speed=13.0) for number in range(1, 4)]
+    driven = drive(beside(), 60.0, speed=13.0, actors=[*platoon, *queue(1.0)])
+    assert lanes(driven) == [0, 1, 0]
+    assert driven.speeds.min() > 3.0
+    assert driven.clearances.min() > 1.0
+
+
+def test_it_comes_back_before_its_lane_to_pass_on_ends() -> None:
+    driven = drive(beside(end=400.0), 60.0, speed=13.0, actors=[car(7, 80.0, speed=10.0), car(8, 100.0, speed=10.0)])
+    assert lanes(driven) == [0, 1, 0]
+    over = driven.fronts[np.abs(driven.states[:, 2]) > 0.5 * WIDTH]
+    assert over.max() < 400.0
+    assert driven.clearances.min() > 1.0
