@@ -86,7 +86,8 @@ def test_nobody_passes_on_a_pedestrian_crossing(grid: NetBuilder) -> None:
     roadmap = grid("--default.lanenumber=2", "--sidewalks.guess", "--crossings.guess")
     found = route(roadmap, "A1B1 B1C1", "A1B1_1")
     middles = [0.5 * (crossing.start_station + crossing.end_station) for crossing in found.crossings]
-    assert middles and found.passing_lanes
+    assert middles
+    assert found.passing_lanes
     assert not any(passing.covers(middle) for passing in found.passing_lanes for middle in middles)
 
 
