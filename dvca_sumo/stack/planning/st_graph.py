@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.boxes import outlines
-from dvca_sumo.messages import PREDICTION_TIMES, Floats, ObjectClass, VehicleShape
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Crossing, Overpass, Route
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Path
@@ -23,6 +23,7 @@ _LANE_ROOM = 0.3  # [m] of lane beside the ego's width that is enough for `trust
 _AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
 _DOUBT = 1.0  # [m] gaps to what stands, and overlaps, up to which its outline is looked at
 _PARTS = 12  # of each side of an outline
+_GRAZING = 0.6  # [m] of overlap of who moves and the body, up to which the outline is looked at
 _BRIDGE = 20.0  # [m] of path under a bridge, before and after the middle of a lane on it
 
 
@@ -86,6 +87,10 @@ def graph_of(
     occupied &= (high > -shape.rear_overhang) & (futures.stations < count - 2)
     for overpass in route.overpasses:
         _pass_over(occupied, overpass, scene, window)
+    grazing = (occupied[: scene.moving] & (gaps[: scene.moving] > -_GRAZING)).nonzero()
+    if grazing[0].size:
+        gaps[grazing] = _beside(scene, window, path, *grazing)
+        occupied[grazing] = gaps[grazing] < margins[grazing[0]]
     if config.trusts_lane_room:
         occupied[scene.moving :][_has_lane_room(scene, window, shape)] = False
     last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)
@@ -100,6 +105,15 @@ def _look_closely(gaps: Floats, scene: Scene, window: Window, path: Path) -> Non
         return
     _, beside = _closely(scene.boxes[scene.owners[scene.moving + doubtful]], window, path)
     gaps[doubtful] = beside.reshape(len(doubtful), -1).min(axis=1)[:, None]
+
+
+def _beside(scene: Scene, window: Window, path: Path, rows: Integers, columns: Integers) -> Floats:
+    """Gaps (n,) [m] sideways to those who move, at moments of futures: in a bend they pass closer by their extents."""
+    boxes = scene.boxes[scene.owners[rows]]
+    boxes[:, :3] = scene.poses[rows, columns]
+    _, gaps = _closely(boxes, window, path)
+    nearest: Floats = gaps.reshape(len(rows), -1).min(axis=1)
+    return nearest
 
 
 def _closely(boxes: Floats, window: Window, path: Path) -> tuple[Floats, Floats]:

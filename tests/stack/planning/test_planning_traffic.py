@@ -18,7 +18,7 @@ from planned_drives import (
     stop_line,
 )
 
-from dvca_sumo.messages import SignalColour
+from dvca_sumo.messages import PREDICTION_TIMES, SignalColour
 from dvca_sumo.roadmap.route import Control, Crossing, Overpass
 from dvca_sumo.stack.planning import Planner, PlanningConfig
 
@@ -163,6 +163,28 @@ def test_ego_half_way_round_a_left_turn_waits_for_who_comes_past_it_and_then_acr
     assert driven.clearances.min() > 0.5
     assert driven.states[-1, 2] > 40.0
     assert_drivable(driven)
+
+
+def test_who_drives_along_on_the_inner_lane_of_a_roundabout_is_no_reason_to_slow_down() -> None:
+    """Its box, at an angle to the ego's line, is wider across it than it is anywhere beside the ego."""
+    bends = [0.0, 0.0, 0.0, -0.005, -0.017, -0.031, -0.048, -0.074, -0.096, -0.068, -0.033, -0.01, 0.013, 0.042, 0.071]
+    stations = np.arange(0.0, 90.5)
+    headings = 0.36 + np.concatenate(
+        ([0.0], np.cumsum(np.interp(stations[:-1] + 0.5, 30.0 + 2.0 * np.arange(15), bends)))
+    )
+    middles = 0.5 * (headings[1:] + headings[:-1])
+    line = np.column_stack([np.cumsum(np.append(0.0, np.cos(middles))), np.cumsum(np.append(0.0, np.sin(middles)))])
+    line += np.array([427.6, 521.7]) - line[30]
+    inner = [(439.51, 544.36, -1.68), (439.2, 541.22, -1.63), (439.25, 538.55, -1.38), (440.17, 536.38, -1.05)]
+    inner += [(441.31, 534.55, -1.03), (442.42, 532.72, -1.03), (443.64, 530.97, -0.84), (445.26, 529.6, -0.58)]
+    inner += [(447.07, 528.46, -0.52), (448.92, 527.38, -0.53), (450.79, 526.35, -0.46), (452.75, 525.49, -0.37)]
+    known = PREDICTION_TIMES[-1] * np.linspace(0.0, 1.0, len(inner))
+    poses = np.column_stack([np.interp(PREDICTION_TIMES, known, column) for column in zip(*inner, strict=True)])
+    ring = predicted([car(3, 439.51, 544.36, heading=-1.68, speed=6.0, size=(5.0, 1.8), lanes=("major_0",))], 0.0)
+    future = msgspec.structs.replace(ring, poses=poses[None])
+    planner = Planner(PlanningConfig(), road(line, stop_lines=[stop_line(45.0, Control.YIELD)]), SHAPE)
+    trajectory = planner.step(believed(427.6, 521.7, heading=0.36, speed=7.7), future, {})
+    assert trajectory.decision == "cruise"
 
 
 @pytest.mark.parametrize(("speed", "x"), [(0.0, 105.0), (1.0, 105.4), (2.0, 105.8), (2.0, 106.2)])
