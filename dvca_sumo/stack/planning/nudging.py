@@ -161,8 +161,8 @@ class NudgeDecider:
         """
         window = situation.window
         span = window.span(blocker.low - self._shape.front, blocker.high + self._shape.rear_overhang)
-        lane_left = float(window.lane_left[span].min()) - self._half + _OVER_LINE
-        lane_right = float(window.lane_right[span].max()) + self._half - _OVER_LINE
+        lane_left = float((window.lane_left - window.swept_left)[span].min()) + _OVER_LINE
+        lane_right = float((window.lane_right - window.swept_right)[span].max()) - _OVER_LINE
         held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
         offsets = self._candidates(blocker, window, span)
         for offset in sorted(offsets, key=lambda offset: (offset * held <= 0.0, abs(offset))):
@@ -177,9 +177,9 @@ class NudgeDecider:
 
     def _candidates(self, blocker: _Blocker, window: Window, span: slice) -> list[float]:
         """At most one offset to the left and one to the right, with the wanted clearance or what the road allows."""
-        room = self._half + self._config.edge_clearance
-        leftmost = float(window.road_left[span].min()) - room
-        rightmost = float(window.road_right[span].max()) + room
+        clearance = self._config.edge_clearance
+        leftmost = float((window.road_left - window.swept_left)[span].min()) - clearance
+        rightmost = float((window.road_right - window.swept_right)[span].max()) + clearance
         left = min(max(blocker.left - blocker.swept_right + blocker.wanted, 0.0), leftmost)
         right = max(min(blocker.right - blocker.swept_left - blocker.wanted, 0.0), rightmost)
         return [offset for offset in (left, right) if self._clears(blocker, offset)]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from planned_drives import SHAPE, Actor, Drive, assert_drivable, car, cone, curve_points, drive, person, road, stop_line
 
+from dvca_sumo.geometry.boxes import box_of, outlines
 from dvca_sumo.messages import ObjectClass
 from dvca_sumo.roadmap.route import Control
 
@@ -190,6 +191,22 @@ def test_person_on_the_outside_of_a_tight_bend_is_passed_with_room_for_the_body_
     driven = drive(route, 30.0, speed=5.0, station=30.0, actors=[beside])
     assert driven.clearances.min() > 1.1
     assert driven.states[-1, 2] > 100.0
+
+
+@pytest.mark.parametrize("beside", [1.4, 1.7, 2.2])
+@pytest.mark.parametrize("radius", [8.0, 12.0])
+def test_body_that_swings_out_in_a_bend_stays_on_the_road_when_it_passes_a_person_on_the_inside(
+    radius: float, beside: float
+) -> None:
+    route = road(curve_points(radius, before=60.0))
+    x, y, heading = route.line.poses(np.array([70.0 + 0.3 * radius]))[0].tolist()
+    inside = person(3, x - beside * math.sin(heading), y + beside * math.cos(heading))
+    driven = drive(route, 25.0, speed=6.0, station=30.0, actors=[inside])
+    bodies = np.array([box_of(x, y, heading, SHAPE) for x, y, heading in driven.states[:, 1:4].tolist()])
+    _, offsets = route.line.project(outlines(bodies, 6).reshape(-1, 2))
+    assert offsets.min() > -1.65
+    assert driven.clearances.min() > 0.35
+    assert (driven.speeds[-1] > 3.0) == (beside > 1.5)
 
 
 @pytest.mark.parametrize("leaves", [5.0, 6.0, 7.0])
