@@ -206,7 +206,7 @@ def test_body_that_swings_out_in_a_bend_stays_on_the_road_when_it_passes_a_perso
     _, offsets = route.line.project(outlines(bodies, 6).reshape(-1, 2))
     assert offsets.min() > -1.65
     assert driven.clearances.min() > 0.35
-    assert (driven.speeds[-1] > 3.0) == (beside > 1.5)
+    assert (driven.states[-1, 2] > 50.0) == (beside > 1.5)
 
 
 @pytest.mark.parametrize("leaves", [5.0, 6.0, 7.0])
