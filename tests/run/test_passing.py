@@ -12,7 +12,10 @@ from dvca_sumo.violations import Ending
 NODES = '<node id="a" x="0" y="0"/><node id="b" x="600" y="0"/><node id="c" x="1200" y="0"/>'
 EDGES = "".join(f'<edge id="{name}" from="{name[0]}" to="{name[1]}" numLanes="2" speed="20"/>' for name in ("ab", "bc"))
 TYPES = '<vType id="tractor" maxSpeed="8" length="7" laneChangeModel="LC2013" lcStrategic="-1" lcSpeedGain="0"/>'
-TRACTOR = '<vehicle id="tractor" type="tractor" depart="0" departLane="0" departPos="60" departSpeed="max"><route edges="ab bc"/></vehicle>'
+TRACTOR = (
+    '<vehicle id="tractor" type="tractor" depart="0" departLane="0" departPos="60" departSpeed="max">'
+    '<route edges="ab bc"/></vehicle>'
+)
 EGO = '<vehicle id="ego" depart="4" departLane="0" departSpeed="max" arrivalPos="500"><route edges="ab bc"/></vehicle>'
 
 
