@@ -12,7 +12,6 @@ from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length, feasib
 from dvca_sumo.stack.planning.reference import BEHIND, Window
 from dvca_sumo.stack.planning.scene import Flags, Scene
 
-_ENDS = np.array([0.0, -1.0, 1.0])[:, None]  # an object's middle, near and far end, in half lengths
 _PERSON, _STATIC = int(ObjectClass.PEDESTRIAN), int(ObjectClass.STATIC)
 _SEEN_LATE = 20.0  # [m] before the end of the window, objects are not yet decided about
 _ALONG = 1.0  # [m] kept lengthwise around an object before the ego moves back
@@ -130,10 +129,9 @@ class NudgeDecider:
         closing = np.maximum(situation.speed - speeds, 0.0)
         way = closing * closing / (2.0 * config.comfort_braking) + _ALONG
         is_beside = is_held & (now.stations - now.half_lengths < self._shape.front + way)
-        rows = window.index(now.stations + _ENDS * now.half_lengths)
+        rows = now.rows(window)
         swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
-        gaps = np.maximum(now.offsets - swept_left, swept_right - now.offsets) - now.half_widths
-        near = gaps < wanted + config.nudge_hold * is_held
+        near = now.gaps(swept_left, swept_right) < wanted + config.nudge_hold * is_held
         near &= scene.is_standing | is_beside
         near &= now.stations + now.half_lengths > -self._shape.rear_overhang - _ALONG
         near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
@@ -194,9 +192,8 @@ class NudgeDecider:
         high = blocker.high + self._shape.rear_overhang + now.half_lengths + _ALONG
         alongside = scene.is_standing & (now.stations > low) & (now.stations < high)
         alongside[blocker.row] = False
-        gaps = np.maximum(now.offsets - offset - blocker.swept_left, blocker.swept_right + offset - now.offsets)
-        gaps -= now.half_widths + self._config.nudge_clearance_least - 1e-6
-        return bool((alongside & (gaps < 0.0)).any())
+        gaps = now.gaps(np.asarray(offset + blocker.swept_left), np.asarray(offset + blocker.swept_right))
+        return bool((alongside & (gaps < self._config.nudge_clearance_least - 1e-6)).any())
 
     def _may_leave_lane(self, blocker: _Blocker, offset: float, situation: Situation) -> bool:
         """For what will not move by itself, when the other lane is free; always to finish what was begun."""

@@ -15,6 +15,7 @@ Flags = npt.NDArray[np.bool_]
 _PERSON = int(ObjectClass.PEDESTRIAN)
 SOON = int(np.searchsorted(PREDICTION_TIMES, 1.0))  # far enough to tell going from staying, too near for a guess
 SOON_TIME = float(PREDICTION_TIMES[SOON])  # [s]
+_ENDS = np.array([0.0, -1.0, 1.0])  # middle, near and far end, in half lengths
 _SPARSE = 4  # every so many times of a hypothesis do to bound it
 _FEW = 8  # hypotheses are placed in less time than it takes to find out which are far away
 _AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
@@ -28,6 +29,19 @@ class Extents(msgspec.Struct, frozen=True, eq=False):
     half_lengths: Floats  # [m] along the reference line
     half_widths: Floats  # [m] across it
     directions: Floats  # cosine of the angle between box and reference line
+
+    def rows(self, window: Window) -> Integers:
+        """(3, ...) rows of the window under their middles, near and far ends.
+
+        A body may pass a middle with room to spare and yet sweep over an end.
+        """
+        ends = _ENDS.reshape(3, *(1,) * self.stations.ndim)
+        return window.index(self.stations + ends * self.half_lengths)
+
+    def gaps(self, left: Floats, right: Floats) -> Floats:
+        """Sideways to a body from offset `right` to `left` beside each; negative where they would overlap [m]."""
+        gaps: Floats = np.maximum(self.offsets - left, right - self.offsets) - self.half_widths
+        return gaps
 
 
 class Scene(msgspec.Struct, frozen=True, eq=False):

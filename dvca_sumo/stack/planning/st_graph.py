@@ -18,7 +18,6 @@ PRESENT = 0.3  # [s] what occupies the path within this time is there already
 _BICYCLE, _PERSON = int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 _WALKS_ACROSS = 0.3  # [m/s] sideways
 _NEVER = 1e4  # [m] for places where there is no leader
-_ENDS = np.array([0.0, -1.0, 1.0])[:, None, None]  # an object's middle, near and far end, in half lengths
 _LANE_ROOM = 0.3  # [m] of lane beside the ego's width that is enough for `trusts_lane_room`
 _AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
 _DOUBT = 1.0  # [m] gaps to what stands, and overlaps, up to which its outline is looked at
@@ -70,12 +69,8 @@ def graph_of(
 ) -> Graph:
     """What comes within its margin of where the ego's body passes, at or ahead of the rear bumper, on its level."""
     futures = scene.futures
-    # The body may pass an object's middle with room to spare and yet sweep over its near or far end.
-    rows = window.index(futures.stations + _ENDS * futures.half_lengths)
-    gaps = np.maximum(
-        futures.offsets - futures.half_widths - path.left[rows].max(axis=0),
-        path.right[rows].min(axis=0) - futures.offsets - futures.half_widths,
-    )
+    rows = futures.rows(window)
+    gaps = futures.gaps(path.left[rows].max(axis=0), path.right[rows].min(axis=0))
     _look_closely(gaps[scene.moving :], scene, window, path)
     count = len(path.arcs)
     stretch = np.zeros(BEHIND + count)
@@ -139,7 +134,7 @@ def _has_lane_room(scene: Scene, window: Window, shape: VehicleShape) -> Flags:
     """
     futures, still = scene.futures, slice(scene.moving, None)
     offsets, half_widths = futures.offsets[still, 0], futures.half_widths[still, 0]
-    rows = window.index(futures.stations[still, 0] + _ENDS[:, :, 0] * futures.half_lengths[still, 0])
+    rows = futures.rows(window)[:, still, 0]
     lane_left, lane_right = window.lane_left[rows].min(axis=0), window.lane_right[rows].max(axis=0)
     left, right = offsets + half_widths, offsets - half_widths
     is_on_line = (left > 0.0) & (right < 0.0)
