@@ -175,12 +175,13 @@ class NudgeDecider:
 
     def _candidates(self, blocker: _Blocker, window: Window, span: slice) -> list[float]:
         """At most one offset to the left and one to the right, with the wanted clearance or what the road allows."""
-        clearance = self._config.edge_clearance
-        leftmost = float((window.road_left - window.swept_left)[span].min()) - clearance
-        rightmost = float((window.road_right - window.swept_right)[span].max()) + clearance
-        left = min(max(blocker.left - blocker.swept_right + blocker.wanted, 0.0), leftmost)
-        right = max(min(blocker.right - blocker.swept_left - blocker.wanted, 0.0), rightmost)
-        return [offset for offset in (left, right) if self._clears(blocker, offset)]
+        edge, least = self._config.edge_clearance, self._config.nudge_clearance_least
+        leftmost = max(float((window.road_left - window.swept_left)[span].min()) - edge, 0.0)
+        rightmost = min(float((window.road_right - window.swept_right)[span].max()) + edge, 0.0)
+        touches_left, touches_right = blocker.left - blocker.swept_right, blocker.right - blocker.swept_left
+        left = min(max(touches_left + blocker.wanted, 0.0), leftmost)
+        right = max(min(touches_right - blocker.wanted, 0.0), rightmost)
+        return [left] * (left - touches_left >= least) + [right] * (touches_right - right >= least)
 
     def _clears(self, blocker: _Blocker, offset: float) -> bool:
         return blocker.clearance(offset) >= self._config.nudge_clearance_least

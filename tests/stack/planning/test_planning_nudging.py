@@ -209,6 +209,21 @@ def test_body_that_swings_out_in_a_bend_stays_on_the_road_when_it_passes_a_perso
     assert (driven.states[-1, 2] > 50.0) == (beside > 1.5)
 
 
+@pytest.mark.parametrize("station", [62.0, 68.0, 72.0])
+@pytest.mark.parametrize("radius", [8.0, 10.0])
+def test_where_there_is_no_room_to_the_far_edge_the_ego_does_not_get_closer_to_what_it_passes(
+    radius: float, station: float
+) -> None:
+    route = road(curve_points(radius, before=60.0))
+    x, y, heading = route.line.poses(np.array([station]))[0].tolist()
+    parked = car(3, x - 2.5 * math.sin(heading), y + 2.5 * math.cos(heading), heading=heading)
+    driven = drive(route, 15.0, speed=3.0, station=45.0, actors=[parked])
+    _, offsets = route.line.project(driven.states[:, 1:3])
+    assert np.abs(offsets[driven.states[:, 0] < 12.0]).max() < 0.3
+    assert driven.clearances.min() > 0.28
+    assert "nudge left 3" not in driven.decisions
+
+
 @pytest.mark.parametrize("leaves", [5.0, 6.0, 7.0])
 def test_who_starts_when_the_ego_is_about_to_pass_is_passed_or_followed_without_a_touch(leaves: float) -> None:
     bus = car(5, 120.0, -0.6, size=(12.0, 2.5), speed=3.0, leaves=leaves)
