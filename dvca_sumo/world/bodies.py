@@ -11,6 +11,7 @@ from dvca_sumo.world.session import Motion
 from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
 
 _SEARCHED = 10.0  # [m] along the route: nobody gets farther in a world step, and a route may come by again soon
+_SIDEWAYS = 0.3  # [m/s] is changing lanes
 _INDICATED = 50.0  # [m] before a junction an ego that turns at it begins to indicate
 # By a movement's direction; T: about, in left-hand traffic.
 _SIDES = {"l": 1, "L": 1, "t": 1, "r": -1, "R": -1, "T": -1}
@@ -55,12 +56,19 @@ class Ego:
     def indicated(self, lane: str) -> int:
         """Which way it indicates, on `lane`: 1 left, -1 right, 0 neither.
 
-        To the lane that the route needs, while that is another; else as it turns at the junction it is on or comes to.
+        To the lane that the route needs, while that is another; else as it turns at the junction it is on or comes to;
+        where it may pass others, as it moves sideways.
         """
         front = self.station() + self.shape.front
         change = self.route.lane_change_at(front)
         if change is not None and lane != change.lanes[-1]:
             return 1 if change.offsets[-1, 0] > change.offsets[0, 0] else -1
+        if self.route.passing_lane_at(front) is not None:
+            truth = self.vehicle.truth
+            along = float(self.route.line.poses([self.station()])[0, 2])
+            sideways = truth.speed * math.sin(truth.heading - along)
+            if abs(sideways) > _SIDEWAYS:
+                return 1 if sideways > 0.0 else -1
         return next((side for begin, end, side in self._turns if begin <= front <= end), 0)
 
 

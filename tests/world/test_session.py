@@ -309,6 +309,21 @@ def test_the_ego_shows_that_it_changes_lanes(tmp_path: Path, street: Path) -> No
     assert sides == [0, 2, 0, 2, 0]  # a change of lanes, then the turn
 
 
+def test_the_ego_shows_to_which_side_it_goes_when_it_passes_somebody(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    nodes = '<node id="a" x="0" y="0"/><node id="b" x="900" y="0"/>'
+    net = plain_file(nodes, '<edge id="ab" from="a" to="b" numLanes="2" speed="20"/>')
+    routes = (
+        '<vType id="slow" maxSpeed="8"/><trip id="tractor" type="slow" depart="0" from="ab" to="ab" departPos="80"/>'
+        '<trip id="ego" depart="1" from="ab" to="ab" departLane="0" departSpeed="18" arrivalPos="700"/>'
+    )
+    seen = shown(scenario_file(tmp_path, net, routes), net)
+    sides = [side for side, _ in itertools.groupby(signals & 3 for *_, signals in seen)]
+    assert [side for side in sides if side] == [2, 1]
+    assert [lane for lane, _ in itertools.groupby(lane for *_, lane, _ in seen)] == ["ab_0", "ab_1", "ab_0"]
+
+
 def test_vehicles_that_collide_with_the_ego_are_not_removed(tmp_path: Path, street: Path) -> None:
     config = scenario_file(tmp_path, street, STANDING + CAR_IN_THE_WAY, collision__action="remove")
     moments = watched(config, 70, speed=10.0)
