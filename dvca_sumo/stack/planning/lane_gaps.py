@@ -14,9 +14,11 @@ from dvca_sumo.messages import Floats, ObjectClass, TrackedObjects, VehicleShape
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.reference import Window
+from dvca_sumo.stack.planning.scene import IN_LANE, Flags
 
-_PERSON = int(ObjectClass.PEDESTRIAN)
+_PERSON, _STATIC = int(ObjectClass.PEDESTRIAN), int(ObjectClass.STATIC)
 LAST_SPEED = 3.0  # [m/s] at which a change in the last moment is done
+_ALONG = 0.5  # cosine of the largest angle to a lane at which someone drives along it
 _SLOWEST = 2.0  # [m/s] beside a gap ...
 _FALLING_BACK = 5.0  # [m/s] ... and for one that is yet to come, which the ego does not wait for before it has to
 _SEEN = 120.0  # [m] before and behind the ego
@@ -30,6 +32,7 @@ class Neighbours(msgspec.Struct, frozen=True, eq=False):
     rears: Floats  # (m,) [m] stations
     fronts: Floats  # (m,) [m]
     speeds: Floats  # (m,) [m/s]
+    is_traffic: Flags  # (m,) heading its way: not parked beside it or across, nor just standing about
     tracks: list[int]  # (m,)
 
 
@@ -52,12 +55,15 @@ class Gaps:
         widths = 0.5 * (boxes[:, 3] * sines + boxes[:, 4] * cosines)
         speeds = velocities[:, 0] * np.cos(headings) + velocities[:, 1] * np.sin(headings)
         is_there = (objects.classes != _PERSON) & (stations < change.latest_station) & (np.abs(stations - here) < _SEEN)
+        heads_along = (np.cos(angles) > _ALONG) & (objects.classes != _STATIC)
         found = []
         for centre in change.centres(stations):
             rows = np.flatnonzero(is_there & (np.abs(offsets - centre) < widths + 0.5 * self._shape.width))
             rows = rows[np.argsort(-stations[rows], kind="stable")]
             places, halves = stations[rows] - here, lengths[rows]
-            found.append(Neighbours(places - halves, places + halves, speeds[rows], objects.ids[rows].tolist()))
+            is_traffic = heads_along[rows] & (np.abs(offsets - centre) < IN_LANE)[rows]
+            tracks = objects.ids[rows].tolist()
+            found.append(Neighbours(places - halves, places + halves, speeds[rows], is_traffic, tracks))
         return found
 
     def is_free(

@@ -10,12 +10,11 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length, feasible_length
 from dvca_sumo.stack.planning.reference import BEHIND, Window
-from dvca_sumo.stack.planning.scene import Flags, Scene
+from dvca_sumo.stack.planning.scene import IN_LANE, Flags, Scene
 
 _PERSON, _STATIC = int(ObjectClass.PEDESTRIAN), int(ObjectClass.STATIC)
 _SEEN_LATE = 20.0  # [m] before the end of the window, objects are not yet decided about
 _ALONG = 1.0  # [m] kept lengthwise around an object before the ego moves back
-_IN_LANE = 1.2  # [m] vehicles whose centre is this near the line are in our lane, not parked beside it
 _OVER_LINE = 0.1  # [m] over the lane marking is not yet another lane
 _COMMITTED = 0.5  # of the offset: from there on it is safer to go on than to go back
 _SLOWEST = 3.0  # [m/s] assumed of the ego when it passes
@@ -218,7 +217,7 @@ class NudgeDecider:
 
         Near a junction anyone may; farther away, who was seen driving.
         """
-        if abs(float(situation.scene.now.offsets[blocker.row])) >= _IN_LANE:
+        if abs(float(situation.scene.now.offsets[blocker.row])) >= IN_LANE:
             return False
         to_lines = [view.distance + self._shape.front - blocker.high for view in situation.views]
         is_near = any(0.0 < distance < self._config.queue_length for distance in to_lines)
@@ -228,7 +227,7 @@ class NudgeDecider:
         """A vehicle in our lane may just wait, however long it has stood: near a line, or behind one that waits."""
         scene, now = situation.scene, situation.scene.now
         is_vehicle = (scene.classes != _PERSON) & (scene.classes != _STATIC)
-        in_lane = is_vehicle & (np.abs(now.offsets) < _IN_LANE)
+        in_lane = is_vehicle & (np.abs(now.offsets) < IN_LANE)
         if not in_lane[blocker.row]:
             return False
         lows, highs = now.stations - now.half_lengths, now.stations + now.half_lengths

@@ -62,8 +62,8 @@ class Passing:
         occupied = self._gaps.occupied(way, window.station, objects)
         stop = last_stop(way, window, 1, speed, shape, config)
         is_late = left < config.return_room * speed
-        beside = self._pace_on(occupied[_BESIDE], wanted, _LONGER * config.passing_outlook)
-        own = self._pace_on(occupied[_OWN], wanted, config.passing_outlook)
+        beside = self._pace_on(occupied[_BESIDE], wanted, _LONGER * config.passing_outlook, is_own=False)
+        own = self._pace_on(occupied[_OWN], wanted, config.passing_outlook, is_own=True)
         is_queue = own < config.passing_slowest
         wish = self._target
         if self._lane == self._target == _BESIDE and (is_late or own >= beside):
@@ -88,10 +88,15 @@ class Passing:
             return None
         return LaneChoice(None, behind, pace)
 
-    def _pace_on(self, lane: Neighbours, wanted: float, outlook: float) -> float:
-        """How fast the slowest is whom the ego, at the speed `wanted`, catches up with within `outlook` [s] [m/s]."""
+    def _pace_on(self, lane: Neighbours, wanted: float, outlook: float, *, is_own: bool) -> float:
+        """How fast the slowest is whom the ego, at the speed `wanted`, catches up with within `outlook` [s] [m/s].
+
+        What is no traffic slows it down on another lane; on its own it is passed in the lane, or next to it.
+        """
         ahead = lane.rears - self._shape.front
         is_met = (ahead > 0.0) & (ahead < outlook * (wanted - lane.speeds))
+        if is_own:
+            is_met &= lane.is_traffic
         return float(lane.speeds[is_met].min(initial=wanted))
 
 

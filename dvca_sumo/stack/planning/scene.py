@@ -13,6 +13,7 @@ from dvca_sumo.stack.planning.reference import BEHIND, Window
 Flags = npt.NDArray[np.bool_]
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
+IN_LANE = 1.2  # [m] vehicles whose middle is this near the middle of a lane are in it, not parked beside it
 SOON = int(np.searchsorted(PREDICTION_TIMES, 1.0))  # far enough to tell going from staying, too near for a guess
 SOON_TIME = float(PREDICTION_TIMES[SOON])  # [s]
 _ENDS = np.array([0.0, -1.0, 1.0])  # middle, near and far end, in half lengths

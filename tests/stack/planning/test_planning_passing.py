@@ -3,7 +3,7 @@
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import Actor, Drive, assert_drivable, car, drive, road, straight_points
+from planned_drives import Actor, Drive, assert_drivable, car, cone, drive, road, straight_points
 
 from dvca_sumo.roadmap import Route
 from dvca_sumo.roadmap.route import PassingLane
@@ -61,6 +61,13 @@ def test_a_queue_is_passed_where_it_cannot_be_for_where_the_ego_goes() -> None:
 
 def test_a_queue_that_may_be_for_where_the_ego_goes_is_joined() -> None:
     assert lanes(drive(beside(leads_on=False), 60.0, speed=13.0, actors=queue(1.0))) == [0]
+
+
+def test_what_only_stands_about_is_passed_within_the_lane_or_next_to_it() -> None:
+    across = car(7, 150.0, -2.4, heading=np.pi / 2.0, size=(4.0, 1.8))
+    driven = drive(beside(), 40.0, speed=13.0, actors=[across, cone(8, 300.0, -1.0)])
+    assert lanes(driven) == [0]
+    assert driven.clearances.min() > 0.3
 
 
 def test_nobody_is_passed_where_there_is_no_room_to_come_back() -> None:
