@@ -163,7 +163,7 @@ class NudgeDecider:
         held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
         offsets = self._candidates(blocker, window, span)
         for offset in sorted(offsets, key=lambda offset: (offset * held <= 0.0, abs(offset))):
-            stays_in_lane = lane_right <= offset <= lane_left
+            stays_in_lane = offset == 0.0 or lane_right <= offset <= lane_left
             if self._meets_another(blocker, offset, situation.scene) or not (
                 stays_in_lane or self._may_leave_lane(blocker, offset, situation)
             ):

@@ -210,7 +210,7 @@ def test_body_that_swings_out_in_a_bend_stays_on_the_road_when_it_passes_a_perso
 
 
 @pytest.mark.parametrize("station", [62.0, 68.0, 72.0])
-@pytest.mark.parametrize("radius", [8.0, 10.0])
+@pytest.mark.parametrize("radius", [6.0, 8.0, 10.0])
 def test_where_there_is_no_room_to_the_far_edge_the_ego_does_not_get_closer_to_what_it_passes(
     radius: float, station: float
 ) -> None:
