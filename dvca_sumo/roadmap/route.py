@@ -127,6 +127,10 @@ class Route(msgspec.Struct, frozen=True, eq=False):
     passing_lanes: tuple[PassingLane, ...] = ()  # by station
     overpasses: tuple[Overpass, ...] = ()  # by station
 
+    def row_at(self, station: float) -> int:
+        """The row of the arrays that holds at a station within the line [m]."""
+        return int(self.line.stations.searchsorted(station, side="right")) - 1
+
     def lane_change_at(self, station: float) -> LaneChange | None:
         """The change of lanes that is to be done at `station` [m], if there is one."""
         return next((one for one in self.lane_changes if one.start_station <= station <= one.latest_station), None)
@@ -139,8 +143,7 @@ class Route(msgspec.Struct, frozen=True, eq=False):
         """Of the lanes that the ego may be on at `station` [m], the one with its centre nearest to `offset` [m]."""
         change, passing = self.lane_change_at(station), self.passing_lane_at(station)
         if change is None:
-            row = int(self.line.stations.searchsorted(station, side="right")) - 1
-            own, aside = self.lane_ids[row], offset
+            own, aside = self.lane_ids[self.row_at(station)], offset
         else:
             nearest = change.nearest(station, offset)
             own, aside = change.lanes[nearest], offset - float(change.centres(np.array([station]))[nearest, 0])

@@ -60,12 +60,7 @@ def _fastest(route: Route, shape: VehicleShape) -> float:
         (max(route.start - shape.front, 0.0), _SIDEWAYS / np.maximum(np.abs(route.curvatures), _STRAIGHT)),
     )
     for begin, bound in bounds:
-        ahead = slice(row_at(route, begin), None)
+        ahead = slice(route.row_at(begin), None)
         way = np.maximum(route.line.stations[ahead] - begin, 0.0)
         squares.append(float((bound[ahead] + 2.0 * _BRAKING * way).min()))
     return math.sqrt(min(squares))
-
-
-def row_at(route: Route, station: float) -> int:
-    """The row of the route's arrays that holds at a station within it."""
-    return int(route.line.stations.searchsorted(station, side="right")) - 1

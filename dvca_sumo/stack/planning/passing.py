@@ -65,12 +65,7 @@ class Passing:
         beside = self._pace_on(occupied[_BESIDE], wanted, _LONGER * config.passing_outlook, is_own=False)
         own = self._pace_on(occupied[_OWN], wanted, config.passing_outlook, is_own=True)
         is_queue = own < config.passing_slowest
-        wish = self._target
-        if self._lane == self._target == _BESIDE and (is_late or own >= beside):
-            wish = _OWN
-        elif self._lane == self._target == _OWN and beside > own + config.passing_gain:
-            wish = _BESIDE if self._lanes[self._next].leads_on or not is_queue else _OWN
-        target = wish
+        wish = target = self._wish(beside, own, is_late=is_late, is_queue=is_queue)
         if target != self._lane:
             is_pressed = self._lane != self._target or is_last_chance(stop, speed)
             room = (0.0, config.comfort_braking) if is_pressed else (config.change_headway, config.change_braking)
@@ -87,6 +82,15 @@ class Passing:
         if self._lane == target == wish:
             return None
         return LaneChoice(None, behind, pace)
+
+    def _wish(self, beside: float, own: float, *, is_late: bool, is_queue: bool) -> int:
+        """The lane to be on by how fast one gets on there [m/s]; a change that is under way is not thought over."""
+        if self._lane != self._target:
+            return self._target
+        if self._lane == _BESIDE:
+            return _OWN if is_late or own >= beside else _BESIDE
+        is_worth_it = beside > own + self._config.passing_gain
+        return _BESIDE if is_worth_it and (self._lanes[self._next].leads_on or not is_queue) else _OWN
 
     def _pace_on(self, lane: Neighbours, wanted: float, outlook: float, *, is_own: bool) -> float:
         """How fast the slowest is whom the ego, at the speed `wanted`, catches up with within `outlook` [s] [m/s].
