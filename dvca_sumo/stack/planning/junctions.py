@@ -120,13 +120,13 @@ class Junctions:
         return index in self._released
 
 
-def has_priority(views: list[LineView], station: float, lanes: tuple[str, ...]) -> bool | None:
-    """Whether traffic on `lanes` has priority over the ego where they meet, at a route station.
+def has_priority(views: list[LineView], near: float, far: float, lanes: tuple[str, ...]) -> bool | None:
+    """Whether traffic on `lanes` has priority over the ego where they meet, between two route stations.
 
     None where the map does not tell: they do not meet on a junction, or not on conflicting lanes.
     """
     for line, _, _, goes_first in views:
-        if line.station - 1.0 <= station <= line.exit_station + _MERGE_REACH:
+        if line.station - 1.0 <= far and near <= line.exit_station + _MERGE_REACH:
             if not goes_first.isdisjoint(lanes):
                 return True
             if not (line.yields_to.isdisjoint(lanes) and line.crosses.isdisjoint(lanes)):

@@ -72,7 +72,7 @@ class Meetings:
             margin = config.pass_margin - (config.pass_hold if graph.track(row) in self._passing else 0.0)
         if margin < config.pass_margin and self._passes([row], graph, profile, margin)[0]:
             return None
-        stop = self._stop(row, graph, views)
+        stop = self._stop(row, graph, views if others_first else [])
         room = stop.at + stop.give
         is_person = graph.scene.classes[graph.scene.owners[row]] == _PERSON
         beside = _BESIDE_PERSON if is_person and profile.speeds[0] < _CREEPING else 0.0
@@ -115,8 +115,8 @@ class Meetings:
         scene = graph.scene
         if scene.classes[scene.owners[row]] == _PERSON:
             return True
-        station = graph.window.station + float(graph.low[row, graph.first[row]])
-        told = has_priority(views, station, scene.lanes[row])
+        near, far = (graph.window.station + float(ends[row, graph.first[row]]) for ends in (graph.low, graph.high))
+        told = has_priority(views, near, far, scene.lanes[row])
         return told if told is not None else not self._cuts_in(row, graph)
 
     def _cuts_in(self, row: int, graph: Graph) -> bool:
@@ -139,7 +139,7 @@ class Meetings:
         return bool(graph.scene.futures.directions[row, last] > ALONG and last > first + _STAYS)
 
     def _stop(self, row: int, graph: Graph, views: list[LineView]) -> Stop:
-        """Before the other's way until it is clear; at the stop line while the ego has not crossed it."""
+        """Before the other's way until it is clear; at the stop line of one of `views` that the ego has not crossed."""
         config, front = self._config, self._shape.front
         first, last, scene = graph.first[row], graph.last[row], graph.scene
         gap = config.person_gap if scene.classes[scene.owners[row]] == _PERSON else config.yield_gap

@@ -207,14 +207,27 @@ def test_stream_with_priority_is_waited_for_at_the_line() -> None:
     assert driven.fronts[-1] > 150.0
 
 
-def test_car_that_has_to_wait_is_passed() -> None:
+@pytest.mark.parametrize("x", [99.3, 106.0])
+def test_car_that_has_to_wait_is_passed(x: float) -> None:
+    """Also where a part of it is on this side of the ego's stop line."""
     driven = drive(
         road(stop_lines=[stop_line(100.0, Control.PRIORITY, yields_to=frozenset())]),
         20.0,
         speed=13.0,
-        actors=[car(3, 106.0, -80.0, heading=UP, speed=10.0, stays_from=6.0, lanes=("minor_0",))],
+        actors=[car(3, x, -80.0, heading=UP, speed=10.0, stays_from=6.0, lanes=("minor_0",))],
     )
     assert driven.speeds.min() > 12.9
+
+
+def test_who_should_have_waited_is_stopped_for_before_its_way_not_at_the_line() -> None:
+    """The ego has priority: at the line it would only hold up those behind it."""
+    late = car(3, 112.0, -6.0, heading=UP, speed=1.0, lanes=("minor_0",))
+    route = road(stop_lines=[stop_line(100.0, Control.PRIORITY, yields_to=frozenset())])
+    driven = drive(route, 12.0, speed=4.0, station=86.0, actors=[late])
+    stands = driven.fronts[driven.speeds < 0.1]
+    assert len(stands)
+    assert 104.0 < stands.min() < 111.0
+    assert driven.clearances.min() > 0.5
 
 
 def test_car_that_should_wait_but_cannot_any_more_is_yielded_to() -> None:
