@@ -221,7 +221,7 @@ def test_car_that_has_to_wait_is_passed(x: float) -> None:
 
 def test_who_should_have_waited_is_stopped_for_before_its_way_not_at_the_line() -> None:
     """The ego has priority: at the line it would only hold up those behind it."""
-    late = car(3, 112.0, -6.0, heading=UP, speed=1.0, lanes=("minor_0",))
+    late = car(3, 112.0, -2.5, heading=UP, speed=0.8, lanes=("minor_0",))
     route = road(stop_lines=[stop_line(100.0, Control.PRIORITY, yields_to=frozenset())])
     driven = drive(route, 12.0, speed=4.0, station=86.0, actors=[late])
     stands = driven.fronts[driven.speeds < 0.1]
