@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from dvca_sumo.geometry.polyline import Floats, Polyline
 from dvca_sumo.roadmap.drawing import Change
@@ -81,12 +82,17 @@ def _put(found: Bounds, lanes: Mapping[str, Lane], line: Polyline, lane: Lane, r
 
 def _centre(line: Polyline, lane: Lane, rows: slice) -> Floats:
     """Offset of the lane's centre from the line; 0 where the lane does not reach (curves joining lanes)."""
+    offsets, is_beside = beside(line, lane.line, rows)
+    return np.where(is_beside, offsets, 0.0)
+
+
+def beside(line: Polyline, other: Polyline, rows: slice) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """Offsets of `other` from the points `rows` of `line` [m], and where it is beside them at all."""
     points, headings = line.points[rows], line.headings[rows]
-    stations, _ = lane.line.project(points)
-    gaps = lane.line.poses(stations)[:, :2] - points
+    stations, _ = other.project(points)
+    gaps = other.poses(stations)[:, :2] - points
     offsets = gaps[:, 1] * np.cos(headings) - gaps[:, 0] * np.sin(headings)
-    inside = (stations > 0.0) & (stations < lane.line.length)
-    return np.where(inside, offsets, 0.0)
+    return offsets, (stations > 0.0) & (stations < other.length)
 
 
 def _beside(lanes: Mapping[str, Lane], lane: Lane, side: str) -> float:

@@ -10,8 +10,8 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from dvca_sumo.geometry.polyline import Floats, Polyline
-from dvca_sumo.roadmap.bounds import evened
+from dvca_sumo.geometry.polyline import Polyline
+from dvca_sumo.roadmap.bounds import beside, evened
 from dvca_sumo.roadmap.lanes import Lane, Movement
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.route import PassingLane
@@ -85,7 +85,7 @@ def _movement(net: NetContents, lane: Lane, onto: Lane) -> Movement | None:
 def _drawn(net: NetContents, chain: _Chain, line: Polyline, is_closed: npt.NDArray[np.bool_]) -> Iterator[PassingLane]:
     parts = chain.parts
     rows = slice(parts[0].rows.start, parts[-1].rows.stop)
-    offsets, is_beside = _beside(net, parts, line, rows)
+    offsets, is_beside = beside(line, _way(net, parts), rows)
     lane_ids = _lane_ids(parts)
     widths = (min(part.lane.width for part in parts), min(part.own.width for part in parts))
     stations = line.stations[rows]
@@ -108,18 +108,11 @@ def _lane_ids(parts: Sequence[_Part]) -> list[str]:
     return ids
 
 
-def _beside(
-    net: NetContents, parts: Sequence[_Part], line: Polyline, rows: slice
-) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """Offsets of the parts from the line [m], and where they are beside it at all."""
+def _way(net: NetContents, parts: Sequence[_Part]) -> Polyline:
+    """The lanes to pass on, end to end."""
     shapes = []
     for part in parts:
         if part.before is not None:
             shapes += [net.lanes[lane].line.points for lane in part.before.internal]
         shapes.append(part.lane.line.points)
-    way = Polyline(np.concatenate(shapes))
-    points, headings = line.points[rows], line.headings[rows]
-    stations, _ = way.project(points)
-    gaps = way.poses(stations)[:, :2] - points
-    offsets = gaps[:, 1] * np.cos(headings) - gaps[:, 0] * np.sin(headings)
-    return offsets, (stations > 0.0) & (stations < way.length)
+    return Polyline(np.concatenate(shapes))

@@ -48,6 +48,8 @@ class Ego:
         """The route's lane under its front bumper, for SUMO's map matching."""
         line = self.route.line
         front = min(self.station() + self.shape.front, line.length)
+        if self.route.lane_change_at(front) is None and self.route.passing_lane_at(front) is None:
+            return self.route.lane_ids[self.route.row_at(front)]
         truth, reach = self.vehicle.truth, self.shape.front
         nose = (truth.x + reach * math.cos(truth.heading), truth.y + reach * math.sin(truth.heading))
         _, offsets = line.project([nose], between=(front - reach, front + reach))

@@ -19,7 +19,7 @@ from dvca_sumo.stack.planning.reference import BEHIND, Window
 from dvca_sumo.stack.planning.speed import Stop
 
 ARRIVED = 0.4  # [m] from the lane's centre
-OVER = 0.2  # [m] of the body over the marking, from which on going on is safer than going back
+_OVER = 0.2  # [m] of the body over the marking, from which on going on is safer than going back
 _WAITING = "wait to change lanes"
 _NEAR_END = 3.0  # [m] before the place where it has to
 
@@ -77,15 +77,13 @@ class LaneChanger:
         stop = last_stop(change, window, last - self._lane, speed, self._shape, self._config)
         has_to = is_last_chance(stop, speed)
         occupied = self._gaps.occupied(change, window.station, objects)
-        config, target = self._config, self._lane
+        target = self._lane
         while target < last:
             is_pressed = has_to or target < self._target
-            room = (0.0, config.comfort_braking) if is_pressed else (config.change_headway, config.change_braking)
-            if not self._gaps.is_free(occupied[target + 1], change, window, speed, *room):
+            if not self._gaps.is_free(occupied[target + 1], change, window, speed, is_pressed=is_pressed):
                 break
             target += 1
-        over = abs(aside) - 0.5 * (change.widths[self._lane] - self._shape.width)
-        if target < self._target and over > OVER:
+        if target < self._target and is_over(aside, change.widths[self._lane], self._shape):
             target = self._target
         self._target = target
         behind = letting_in(occupied[self._lane + 1 : target + 1], self._shape)
@@ -122,6 +120,11 @@ def last_stop(
     if at + 0.5 * way < speed * speed / (2.0 * config.comfort_braking):
         return Stop(change.latest_station - config.stop_line_gap - here, config.stop_line_gap, _WAITING)
     return Stop(at, 0.5 * way, _WAITING)
+
+
+def is_over(aside: float, width: float, shape: VehicleShape) -> bool:
+    """Whether an ego `aside` of the centre of its lane [m] is that far over the marking that it should go on."""
+    return abs(aside) - 0.5 * (width - shape.width) > _OVER
 
 
 def is_last_chance(stop: Stop, speed: float) -> bool:

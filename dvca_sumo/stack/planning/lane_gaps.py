@@ -14,11 +14,10 @@ from dvca_sumo.messages import Floats, ObjectClass, TrackedObjects, VehicleShape
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.reference import Window
-from dvca_sumo.stack.planning.scene import IN_LANE, Flags
+from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags
 
 _PERSON, _STATIC = int(ObjectClass.PEDESTRIAN), int(ObjectClass.STATIC)
 LAST_SPEED = 3.0  # [m/s] at which a change in the last moment is done
-_ALONG = 0.5  # cosine of the largest angle to a lane at which someone drives along it
 _SLOWEST = 2.0  # [m/s] beside a gap ...
 _FALLING_BACK = 5.0  # [m/s] ... and for one that is yet to come, which the ego does not wait for before it has to
 _SEEN = 120.0  # [m] before and behind the ego
@@ -55,28 +54,29 @@ class Gaps:
         widths = 0.5 * (boxes[:, 3] * sines + boxes[:, 4] * cosines)
         speeds = velocities[:, 0] * np.cos(headings) + velocities[:, 1] * np.sin(headings)
         is_there = (objects.classes != _PERSON) & (stations < change.latest_station) & (np.abs(stations - here) < _SEEN)
-        heads_along = (np.cos(angles) > _ALONG) & (objects.classes != _STATIC)
+        heads_along = (np.cos(angles) > ALONG) & (objects.classes != _STATIC)
         found = []
         for centre in change.centres(stations):
-            rows = np.flatnonzero(is_there & (np.abs(offsets - centre) < widths + 0.5 * self._shape.width))
+            aside = np.abs(offsets - centre)
+            rows = np.flatnonzero(is_there & (aside < widths + 0.5 * self._shape.width))
             rows = rows[np.argsort(-stations[rows], kind="stable")]
             places, halves = stations[rows] - here, lengths[rows]
-            is_traffic = heads_along[rows] & (np.abs(offsets - centre) < IN_LANE)[rows]
+            is_traffic = heads_along[rows] & (aside[rows] < IN_LANE)
             tracks = objects.ids[rows].tolist()
             found.append(Neighbours(places - halves, places + halves, speeds[rows], is_traffic, tracks))
         return found
 
-    def is_free(
-        self, lane: Neighbours, change: LaneChange, window: Window, speed: float, headway: float, braking: float
-    ) -> bool:
-        """Whether nobody on the lane has to brake harder than `braking` [m/s^2] when the ego is there.
+    def is_free(self, lane: Neighbours, change: LaneChange, window: Window, speed: float, *, is_pressed: bool) -> bool:
+        """Whether nobody on the lane has to brake more than a little when the ego is there.
 
-        That is where the change can begin, those on the lane keeping their speeds until then. Who follows
-        whom is to be `headway` [s] behind.
+        That is where the change can begin, those on the lane keeping their speeds until then.
         """
         if not lane.tracks:
             return True
-        shape = self._shape
+        config, shape = self._config, self._shape
+        headway, braking = (
+            (0.0, config.comfort_braking) if is_pressed else (config.change_headway, config.change_braking)
+        )
         ahead = max(change.start_station - window.station - shape.front, 0.0)
         wait = ahead / max(speed, LAST_SPEED)
         rears, fronts = lane.rears + lane.speeds * wait, lane.fronts + lane.speeds * wait
@@ -86,7 +86,7 @@ class Gaps:
         gaps = np.where(is_ahead, rears - nose, tail - fronts)
         closing = np.where(is_ahead, closing, -closing)
         followers = np.where(is_ahead, speed, lane.speeds)
-        needed = self._config.change_gap + headway * followers + np.square(np.maximum(closing, 0.0)) / (2.0 * braking)
+        needed = config.change_gap + headway * followers + np.square(np.maximum(closing, 0.0)) / (2.0 * braking)
         return bool((gaps >= needed).all())
 
     def pace(self, lane: Neighbours, change: LaneChange, window: Window, speed: float) -> float:

@@ -9,9 +9,9 @@ import numpy as np
 from dvca_sumo.messages import ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView, has_priority
-from dvca_sumo.stack.planning.scene import SOON, SOON_TIME, Flags
+from dvca_sumo.stack.planning.scene import ALONG, SOON, SOON_TIME, Flags
 from dvca_sumo.stack.planning.speed import STEP_TIMES, Profile, Stop
-from dvca_sumo.stack.planning.st_graph import ALONG, PRESENT, Graph
+from dvca_sumo.stack.planning.st_graph import PRESENT, Graph
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
 _SPEEDS_UP = 0.4  # [m/s] faster over the next second than now

@@ -180,7 +180,12 @@ class NudgeDecider:
         touches_left, touches_right = blocker.left - blocker.swept_right, blocker.right - blocker.swept_left
         left = min(max(touches_left + blocker.wanted, 0.0), leftmost)
         right = max(min(touches_right - blocker.wanted, 0.0), rightmost)
-        return [left] * (left - touches_left >= least) + [right] * (touches_right - right >= least)
+        offsets = []
+        if left - touches_left >= least:
+            offsets.append(left)
+        if touches_right - right >= least:
+            offsets.append(right)
+        return offsets
 
     def _clears(self, blocker: _Blocker, offset: float) -> bool:
         return blocker.clearance(offset) >= self._config.nudge_clearance_least

@@ -13,9 +13,9 @@ from dvca_sumo.roadmap.route import LaneChange, PassingLane, Route
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.lane_changing import (
     ARRIVED,
-    OVER,
     LaneChoice,
     is_last_chance,
+    is_over,
     keeping,
     last_stop,
     letting_in,
@@ -68,9 +68,8 @@ class Passing:
         wish = target = self._wish(beside, own, is_late=is_late, is_queue=is_queue)
         if target != self._lane:
             is_pressed = self._lane != self._target or is_last_chance(stop, speed)
-            room = (0.0, config.comfort_braking) if is_pressed else (config.change_headway, config.change_braking)
-            is_over = aside[self._lane] > 0.5 * (way.widths[self._lane] - shape.width) + OVER
-            if not is_over and not self._gaps.is_free(occupied[target], way, window, speed, *room):
+            goes_on = is_over(float(aside[self._lane]), way.widths[self._lane], shape)
+            if not goes_on and not self._gaps.is_free(occupied[target], way, window, speed, is_pressed=is_pressed):
                 target = self._lane
         pace = math.inf
         if target != wish and (is_late or is_queue):

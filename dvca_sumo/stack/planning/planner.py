@@ -140,7 +140,8 @@ class Planner:
         stops = [nearest_stop(to_destination, graph, views, leader, shape, config)]
         if choice.keeping is not None:
             stops.append(choice.keeping.stop)
-        caps = [min(cap, choice.pace) for cap in caps]
+        if choice.pace < math.inf:
+            caps = [min(cap, choice.pace) for cap in caps]
         profile = roll_out(start.speed, start.acceleration, caps, stops, leader, config)
         demands: dict[int, Demand] = {}
         for _ in range(_ROUNDS):

@@ -14,6 +14,7 @@ Flags = npt.NDArray[np.bool_]
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
 IN_LANE = 1.2  # [m] vehicles whose middle is this near the middle of a lane are in it, not parked beside it
+ALONG = 0.5  # cosine of the largest angle (60 degrees) to a lane or path at which someone drives along it, not across
 SOON = int(np.searchsorted(PREDICTION_TIMES, 1.0))  # far enough to tell going from staying, too near for a guess
 SOON_TIME = float(PREDICTION_TIMES[SOON])  # [s]
 _ENDS = np.array([0.0, -1.0, 1.0])  # middle, near and far end, in half lengths

@@ -9,10 +9,9 @@ from dvca_sumo.roadmap.route import Crossing, Overpass, Route
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Path
 from dvca_sumo.stack.planning.reference import BEHIND, Window
-from dvca_sumo.stack.planning.scene import Flags, Scene
+from dvca_sumo.stack.planning.scene import ALONG, Flags, Scene
 from dvca_sumo.stack.planning.speed import STEP_TIMES, Leader
 
-ALONG = 0.5  # cosine of the largest angle (60 degrees) at which someone moves along the path, not across
 PRESENT = 0.3  # [s] what occupies the path within this time is there already
 
 _BICYCLE, _PERSON = int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)

@@ -10,10 +10,10 @@ import numpy as np
 from dvca_sumo.messages import ObjectClass, TrackedObjects
 from dvca_sumo.roadmap.route import Approach
 from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.scene import ALONG
 
 _WATCHED_CLASSES = (int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE))
 _SAME = 1.0  # [m] from where a track was lost, one found is the same
-_ALONG = 0.5  # cosine of the largest angle (60 degrees) to a lane at which someone drives on it
 
 
 class Stage(enum.StrEnum):
@@ -67,7 +67,7 @@ class WatchList:
             along = np.cos(boxes[rows, 2] - line.poses(stations)[:, 2])
             reach = max(0.5 * approach.width, config.watch_beside)
             at_line = line.length - (stations + 0.5 * boxes[rows, 3]) <= config.watch_before
-            found = rows[at_line & (np.abs(offsets) <= reach) & (along >= _ALONG)]
+            found = rows[at_line & (np.abs(offsets) <= reach) & (along >= ALONG)]
             for row in found.tolist():
                 x, y = boxes[row, :2].tolist()
                 self._watched[int(objects.ids[row])] = _Place(x, y, approach)
