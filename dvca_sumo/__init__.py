@@ -2,11 +2,14 @@
 
 import importlib
 import os
+import sys
 from typing import TYPE_CHECKING
 
-# One thread in numpy's linear algebra: the arrays are small, sums keep one order, and a process
-# with threads cannot be forked.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# One thread in numpy's linear algebra: how a product is shared out among threads decides its last bits,
+# the arrays are small, and a process with threads cannot be forked.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+if "numpy" in sys.modules:  # and has read its environment
+    importlib.import_module("threadpoolctl").threadpool_limits(limits=1, user_api="blas")
 
 if TYPE_CHECKING:
     from dvca_sumo.api import attribute, drive, load_scenario
