@@ -13,6 +13,7 @@ from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import Floats, ObjectClass, TrackedObjects, VehicleShape
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.path import blend_length
 from dvca_sumo.stack.planning.reference import Window
 from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags
 
@@ -20,6 +21,7 @@ _PERSON, _STATIC = int(ObjectClass.PEDESTRIAN), int(ObjectClass.STATIC)
 LAST_SPEED = 3.0  # [m/s] at which a change in the last moment is done
 _SLOWEST = 2.0  # [m/s] beside a gap ...
 _FALLING_BACK = 5.0  # [m/s] ... and for one that is yet to come, which the ego does not wait for before it has to
+_WITHIN = 0.3  # of its way to the next lane, the ego's body stays in its own
 _SEEN = 120.0  # [m] before and behind the ego
 _CATCHES_UP = 0.8  # of the ego's speed: slower ones are come up to ...
 _FORWARD = 3.0  # ... while a gap beside faster ones is that much harder to get to than one farther back
@@ -69,16 +71,22 @@ class Gaps:
     def is_free(self, lane: Neighbours, change: LaneChange, window: Window, speed: float, *, is_pressed: bool) -> bool:
         """Whether nobody on the lane has to brake more than a little when the ego is there.
 
-        That is where the change can begin, those on the lane keeping their speeds until then.
+        That is where the change can begin, those on the lane keeping their speeds until then; pressed, where
+        the body gets over the marking. Thus it takes up what those who stop for it offer.
         """
         if not lane.tracks:
             return True
         config, shape = self._config, self._shape
-        headway, braking = (
-            (0.0, config.comfort_braking) if is_pressed else (config.change_headway, config.change_braking)
-        )
+        headway, braking = config.change_headway, config.change_braking
         ahead = max(change.start_station - window.station - shape.front, 0.0)
         wait = ahead / max(speed, LAST_SPEED)
+        if is_pressed:
+            headway, braking = 0.0, config.comfort_braking
+            within = _WITHIN * blend_length(max(change.widths), LAST_SPEED, config)
+            faster = math.sqrt(speed * speed + 2.0 * config.acceleration * within)
+            ahead += within
+            wait += (faster - speed) / config.acceleration
+            speed = faster
         rears, fronts = lane.rears + lane.speeds * wait, lane.fronts + lane.speeds * wait
         nose, tail = ahead + shape.front, ahead - shape.rear_overhang
         closing = speed - lane.speeds

@@ -125,3 +125,17 @@ def test_while_it_waits_it_does_not_go_around_a_standing_car_on_the_lane_it_wait
     behind = car(8, station - 10.6, WIDTH, speed=speed, leaves=2.0)
     driven = drive(crossing_over(), 12.0, station=station, actors=[car(99, station + 12.0), beside, behind])
     assert driven.clearances.min() > 0.5
+
+
+@pytest.mark.parametrize("overlap", [-1.0, 0.5])
+def test_it_goes_in_front_of_one_that_stays_beside_its_rear_when_the_queue_drives_off(overlap: float) -> None:
+    """In a queue, those who let somebody in leave no more than that."""
+    packed = [car(number, 60.0 + 6.5 * number, WIDTH) for number in range(60)]
+    rear = drive(crossing_over(), 40.0, speed=13.0, actors=packed).fronts[-1] - SHAPE.length
+    half = 0.5 * car(0, 0.0).size[0]
+    behind = [car(number, rear + overlap - half - 6.5 * number, WIDTH) for number in range(40)]
+    ahead = [car(40 + row, rear + overlap + 1.5 + half + 6.5 * row, WIDTH, speed=6.0, leaves=45.0) for row in range(5)]
+    driven = drive(crossing_over(), 70.0, speed=13.0, actors=[*behind, *ahead])
+    assert driven.clearances.min() > 0.3
+    assert lane_at(driven, LATEST) == pytest.approx(1.0, abs=0.1)
+    assert_drivable(driven)
