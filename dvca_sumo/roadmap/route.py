@@ -112,6 +112,7 @@ class Route(msgspec.Struct, frozen=True, eq=False):
 
     line: Polyline  # through lanes and junctions, lane changes blended in
     lane_ids: tuple[str, ...]
+    along_lanes: Floats  # [m] how much lane lies behind: where the line cuts a corner, it grows faster than stations
     speed_limits: Floats  # [m/s] by law
     curvatures: Floats  # [1/m]
     lane_left: Floats  # [m] edges of the lane, of both lanes during a lane change
@@ -130,6 +131,11 @@ class Route(msgspec.Struct, frozen=True, eq=False):
     def row_at(self, station: float) -> int:
         """The row of the arrays that holds at a station within the line [m]."""
         return int(self.line.stations.searchsorted(station, side="right")) - 1
+
+    def lane_between(self, rear: float, front: float) -> float:
+        """How much lane, along its centre, two stations [m] have between them [m]."""
+        behind, ahead = np.interp((rear, front), self.line.stations, self.along_lanes).tolist()
+        return float(ahead - behind)
 
     def lane_change_at(self, station: float) -> LaneChange | None:
         """The change of lanes that is to be done at `station` [m], if there is one."""

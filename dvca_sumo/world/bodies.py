@@ -55,6 +55,11 @@ class Ego:
         _, offsets = line.project([nose], between=(front - reach, front + reach))
         return self.route.lane_at(front, float(offsets[0]))
 
+    def occupied(self) -> float:
+        """How much lane it takes up [m]: more than its length where it cuts the corner that the lanes drive out."""
+        station, shape = self.station(), self.shape
+        return max(shape.length, self.route.lane_between(station - shape.rear_overhang, station + shape.front))
+
     def indicated(self, lane: str) -> int:
         """Which way it indicates, on `lane`: 1 left, -1 right, 0 neither.
 

@@ -40,6 +40,7 @@ _MATCHED_WITHIN = 30.0  # [m] of a lane an ego is on the road; SUMO looks at eve
 _GIVES_UP = (libsumo.TraCIException, libsumo.FatalTraCIError)
 _INDICATORS = {1: 0b10, 0: 0, -1: 0b1}  # by the side they tell; bits of SUMO's signals
 _BRAKE_LIGHT = 0b1000
+_TOLD_ANEW = 0.2  # [m] of difference in length
 _STANDING = 0.1  # [m/s] up to which SUMO's vehicles show their brake lights
 _TWO_WHEELED = ("bicycle", "moped", "motorcycle", "scooter")
 
@@ -83,6 +84,7 @@ class Session:
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
         self._itineraries: dict[str, Itinerary] = {}  # by ego
         self._setbacks: dict[str, Setback] = {}  # by ego
+        self._lengths: dict[str, float] = {}  # [m] by ego, that SUMO was told
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
 
     @property
@@ -187,6 +189,8 @@ class Session:
         of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
         self._itineraries[entry.ego] = Itinerary(entry.edges, of.getRouteID(entry.ego))
         self._setbacks[entry.ego] = Setback()
+        self._lengths[entry.ego] = entry.length
+        self._vehicle(entry.ego)  # the length it has, before SUMO is told what it takes up
         self.watch(entry.ego, radius)
 
     def skip_stops(self, vehicle: str) -> None:
@@ -206,7 +210,7 @@ class Session:
 
     def remove(self, vehicle: str) -> None:
         """Take a vehicle out of the simulation."""
-        del self._crowds[vehicle], self._itineraries[vehicle], self._setbacks[vehicle]
+        del self._crowds[vehicle], self._itineraries[vehicle], self._setbacks[vehicle], self._lengths[vehicle]
         of = libsumo.vehicle
         for kind in (tc.CMD_GET_VEHICLE_VARIABLE, tc.CMD_GET_PERSON_VARIABLE):
             of.unsubscribeContext(vehicle, kind, 0.0)  # else SUMO gives up at the next step
@@ -236,6 +240,12 @@ class Session:
         libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
         # SUMO's own would tell what its driver, overruled, meant to do.
         libsumo.vehicle.setSignals(ego, _INDICATORS[indicated] | (_BRAKE_LIGHT if _is_braking(truth) else 0))
+
+    def stretch(self, ego: str, length: float) -> None:
+        """Tell SUMO how much lane an ego takes up [m]: its drivers stop that far behind its front."""
+        if abs(length - self._lengths[ego]) > _TOLD_ANEW:
+            self._lengths[ego] = length
+            libsumo.vehicle.setLength(ego, length)
 
     def objects(self, ego: str) -> ObjectsTruth:
         """Every moving body near a watched vehicle: vehicles (parked ones too), people on foot."""

@@ -72,6 +72,7 @@ def road(length: float = 300.0, destination: float = 250.0) -> Route:
     return Route(
         line=line,
         lane_ids=("in_0",) * len(stations),
+        along_lanes=line.stations,
         speed_limits=np.full(len(stations), 13.9),
         curvatures=line.curvatures,
         lane_left=edge,

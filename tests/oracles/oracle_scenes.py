@@ -56,6 +56,7 @@ def road_along(line: Polyline) -> Route:
     return Route(
         line=line,
         lane_ids=("in_0",) * len(line),
+        along_lanes=line.stations,
         speed_limits=np.full(len(line), 13.9),
         curvatures=line.curvatures,
         lane_left=edge,

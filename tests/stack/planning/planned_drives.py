@@ -58,6 +58,7 @@ def road(
     return Route(
         line=line,
         lane_ids=("ego_0",) * len(line),
+        along_lanes=line.stations,
         speed_limits=limit * ones,
         curvatures=line.curvatures,
         lane_left=1.6 * ones,
