@@ -114,9 +114,6 @@ def _overrides(configuration: Configuration, seed: int, begin: float) -> tuple[O
         ("duration-log.disable", "true", "terminal"),
         ("verbose", "false", "terminal"),
     ]
-    step = seconds(options.get("step-length", "1"), "step-length")
-    if step > STEP_LENGTH and "default.action-step-length" not in options:
-        wanted.append(("default.action-step-length", f"{step:g}", "drivers keep their reaction interval"))
     if "no-internal-links" in options:
         wanted.append(("no-internal-links", "false", "junctions are driven over, not jumped"))
     if begin != seconds(options.get("begin", "0"), "begin"):

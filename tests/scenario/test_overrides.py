@@ -20,35 +20,20 @@ def changes(scenario: Scenario) -> dict[str, tuple[str | None, str]]:
     return {one.option: (one.configured, one.used) for one in scenario.overrides}
 
 
-@pytest.mark.parametrize("step", ["1", "0.5", "0.2"])
-def test_longer_steps_become_the_world_step_while_drivers_keep_their_reaction_interval(
-    tmp_path: Path, net: Path, step: str
-) -> None:
+@pytest.mark.parametrize("step", ["1", "0.5", "0.05"])
+def test_another_step_becomes_the_world_step(tmp_path: Path, net: Path, step: str) -> None:
     changed = changes(load_scenario(scenario_file(tmp_path, net, step_length=step)))
     assert changed["step-length"] == (step, "0.1")
-    assert changed["default.action-step-length"] == (None, step)
 
 
 def test_an_unset_step_is_sumos_second(tmp_path: Path, net: Path) -> None:
     changed = changes(load_scenario(scenario_file(tmp_path, net)))
     assert changed["step-length"] == (None, "0.1")
-    assert changed["default.action-step-length"] == (None, "1")
-
-
-def test_a_configured_reaction_interval_stays(tmp_path: Path, net: Path) -> None:
-    config = scenario_file(tmp_path, net, step_length="0.5", default__action_step_length="0.7")
-    assert "default.action-step-length" not in changes(load_scenario(config))
-
-
-def test_a_shorter_step_is_overridden_without_a_reaction_interval(tmp_path: Path, net: Path) -> None:
-    changed = changes(load_scenario(scenario_file(tmp_path, net, step_length="0.05")))
-    assert changed["step-length"] == ("0.05", "0.1")
-    assert "default.action-step-length" not in changed
 
 
 def test_the_world_step_itself_is_no_override(tmp_path: Path, net: Path) -> None:
     changed = changes(load_scenario(scenario_file(tmp_path, net, step_length="0.1")))
-    assert not {"step-length", "default.action-step-length"} & changed.keys()
+    assert "step-length" not in changed
 
 
 def test_junctions_are_driven_over_even_where_sumo_is_told_to_jump_them(tmp_path: Path, net: Path) -> None:

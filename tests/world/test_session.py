@@ -392,17 +392,15 @@ def test_an_ego_passes_its_stops_as_a_vehicle_on_the_road(
     assert in_child(job) == [{("bc", 0, 0)}, pytest.approx(0.0)]
 
 
-@pytest.mark.parametrize("step", ["0.5", "1"])
-def test_drivers_keep_their_reaction_interval(tmp_path: Path, street: Path, step: str) -> None:
-    config = scenario_file(tmp_path, street, STANDING + CAR_IN_THE_WAY, step_length=step)
-    assert asked(config, 1, lambda sumo: sumo.vehicle.getActionStepLength("stopped")) == float(step)
-    assert asked(config, 1, lambda sumo: sumo.simulation.getDeltaT()) == 0.1
-
-
-def test_a_shorter_configured_step_is_lengthened(tmp_path: Path, street: Path) -> None:
-    config = scenario_file(tmp_path, street, STANDING + CAR_IN_THE_WAY, step_length="0.05")
+@pytest.mark.parametrize("step", ["1", "0.5", "0.05"])
+@pytest.mark.parametrize(("configured", "interval"), [({}, 0.1), ({"default__action_step_length": "0.7"}, 0.7)])
+def test_drivers_act_at_every_world_step_unless_the_scenario_has_them_act_at_intervals(
+    tmp_path: Path, street: Path, step: str, configured: dict[str, str], interval: float
+) -> None:
+    """In steps of 0.1 s, drivers who act once a second jam junctions that flow in steps of 1 s, too."""
+    config = scenario_file(tmp_path, street, STANDING + CAR_IN_THE_WAY, step_length=step, **configured)
     answers = asked(config, 1, lambda sumo: (sumo.vehicle.getActionStepLength("stopped"), sumo.simulation.getDeltaT()))
-    assert answers == (0.1, 0.1)
+    assert answers == (interval, 0.1)
 
 
 @pytest.mark.parametrize(("begin", "asked_for"), [("0:0:10", None), ("10", None), ("0", 10.0)])
