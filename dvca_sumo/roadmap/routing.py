@@ -1,7 +1,6 @@
 """From a list of edges to a Route: choose lanes, draw them, smooth the line, note what lies along it."""
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
 import msgspec
 import numpy as np
@@ -73,7 +72,7 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
     return Route(
         line=line,
         lane_ids=tuple(lane.id for lane in followed),
-        along_lanes=_fixed(_along_lanes(plan, line, along)),
+        along_lanes=_fixed(along),
         speed_limits=_fixed(np.array([lane.speed_limit for lane in followed])),
         curvatures=line.curvatures,
         lane_left=edges_of.lane_left,
@@ -202,25 +201,8 @@ def _changes(plan: _Plan, line: Polyline, along: Floats) -> list[Change]:
 
 def _followed(plan: _Plan, along: Floats) -> list[Lane]:
     """The lane that each of the points `along` the rough line follows."""
-    return [plan.stretches[owner].lane for owner in _owners(plan, along)]
-
-
-def _owners(plan: _Plan, along: Floats) -> list[int]:
-    """The stretch that each of the points `along` the rough line lies on."""
     owners = np.searchsorted([stretch.begin for stretch in plan.stretches], along, side="right") - 1
-    found: list[int] = np.maximum(owners, 0).tolist()
-    return found
-
-
-def _along_lanes(plan: _Plan, line: Polyline, along: Floats) -> Floats:
-    """How much lane lies behind each point of the line [m], those lanes that it leaves counted as far as it did."""
-    lanes = [stretch.lane for stretch in plan.stretches]
-    steps = [0.0 if lane.edge == onto.edge else lane.line.length for lane, onto in pairwise(lanes)]
-    begins = np.concatenate(([0.0], np.cumsum(steps)))
-    found = np.empty(len(line))
-    for owner, rows in runs(_owners(plan, along)):
-        found[rows] = begins[owner] + lanes[owner].line.project(line.points[rows])[0]
-    return found
+    return [plan.stretches[owner].lane for owner in np.maximum(owners, 0)]
 
 
 def _located(line: Polyline, lane: Lane, station: float, span: tuple[float, float]) -> float:

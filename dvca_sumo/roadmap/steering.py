@@ -27,7 +27,7 @@ _CORNERS = np.array([(ahead, side) for ahead in (_FRONT, -_REAR) for side in (_H
 _STRAY = 0.15  # [m] a corner beyond the edge of the lane that the line is drawn anew for
 _CLEARANCE = 0.1  # [m] wanted between a corner and the road's edge
 _BETWEEN = 0.25  # [m] points of the line, about
-_LEAP = 5.0  # [m] of line at most are abreast of half an arc that cuts a corner
+_ABREAST = 0.25  # [m] between the stations that points are told to be abreast of
 _ITERATIONS = 60
 _ENOUGH = 1e-4  # relative gain of a step that is not worth another one
 
@@ -167,11 +167,25 @@ def _drawn(window: _Window, length: float) -> Floats:
 
 
 def _abreast(line: Polyline, points: Floats) -> Floats:
-    """The station on `line` of each point, never back: a turn back has two passes side by side."""
-    stations = [0.0]
-    for x, y in points[1:-1].tolist():
-        stations.append(line.station(x, y, between=(stations[-1], stations[-1] + _LEAP)))
-    return np.array([*stations, line.length])
+    """The station on `line` of each point, from end to end and never back: a turn back has two passes side by side.
+
+    Of all such ways the one with the least squared distances in sum (dynamic time warping, Sakoe and Chiba 1978): where
+    the points cut a corner, the station leaps over its tip.
+    """
+    stations = np.linspace(0.0, line.length, round(line.length / _ABREAST) + 1)
+    places = np.arange(len(stations))
+    offsets = line.poses(stations)[:, :2] - points[:, None]
+    gaps = np.square(offsets).sum(axis=2)
+    total = np.where(places == 0, gaps[0], np.inf)
+    came_from = []
+    for row in gaps[1:]:
+        least = np.minimum.accumulate(total)
+        came_from.append(np.maximum.accumulate(np.where(total == least, places, 0)))
+        total = least + row
+    way = [len(stations) - 1]
+    for before in reversed(came_from):
+        way.append(int(before[way[-1]]))
+    return stations[way[::-1]]
 
 
 def _spread(turns: Floats, most: float) -> Floats:

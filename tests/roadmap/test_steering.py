@@ -135,3 +135,17 @@ def test_a_turn_that_can_be_steered_is_drawn_so_that_the_body_stays_in_its_lane(
 def test_a_wide_turn_is_left_as_it_is() -> None:
     line = corner(25.0, 0.5 * np.pi)
     assert not straying(line, *room(line, 1.6)).any()
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.0, -15.0), (30.0, -30.0), (40.0, -80.0)])
+def test_where_the_line_cuts_a_sharp_tip_it_is_on_the_next_lane_at_once(plain: NetBuilder, x: float, y: float) -> None:
+    """Not on the one before until it has come as far as that reached."""
+    nodes = f'<node id="a" x="0" y="0"/><node id="b" x="100" y="0" radius="0.5"/><node id="c" x="{x}" y="{y}"/>'
+    edges = '<edge id="ab" from="a" to="b" speed="13.9"/><edge id="bc" from="b" to="c" speed="13.9"/>'
+    net = plain(nodes, edges)
+    route = net.route(["ab", "bc"], "ab_0", 5.0, None, 60.0)
+    driven = (route.line.stations >= route.start) & (route.line.stations <= route.destination)
+    for row in driven.nonzero()[0].tolist():
+        lane, point = net.lanes[route.lane_ids[row]].line, route.line.points[row]
+        station, _ = lane.project([point])
+        assert np.hypot(*(lane.poses(station)[0, :2] - point)) < 5.5
