@@ -9,6 +9,7 @@ import numpy as np
 from dvca_sumo.messages import ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView, has_priority
+from dvca_sumo.stack.planning.reference import BEHIND
 from dvca_sumo.stack.planning.scene import ALONG, SOON, SOON_TIME, Flags
 from dvca_sumo.stack.planning.speed import STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import PRESENT, Graph
@@ -16,6 +17,7 @@ from dvca_sumo.stack.planning.st_graph import PRESENT, Graph
 _PERSON = int(ObjectClass.PEDESTRIAN)
 _SPEEDS_UP = 0.4  # [m/s] faster over the next second than now
 _CUTS_IN = 0.5  # [m] moved sideways before the meeting: the other comes into our lane, not we into theirs
+_OFF_LANE = 0.5  # [m] of the body beyond the edge of its lane, by the line, not by what it swerves for
 _STAYS = 2  # columns of the graph, after which somebody is on the path to drive along it
 _HARD_GAP = 0.5  # [m] to the other's way, defended by hard braking
 _LEAST_ROOM = 0.1  # [m]
@@ -111,13 +113,21 @@ class Meetings:
         return after
 
     def _others_first(self, row: int, graph: Graph, views: list[LineView]) -> bool:
-        """Whether the other has priority. People have; on junctions the map tells; who leaves its lane has not."""
+        """Whether the other has priority. People have; on junctions the map tells; who leaves its lane has not.
+
+        That is the ego itself where its line has left the lane, in turns that it cannot drive within.
+        """
         scene = graph.scene
         if scene.classes[scene.owners[row]] == _PERSON:
             return True
         near, far = (graph.window.station + float(ends[row, graph.first[row]]) for ends in (graph.low, graph.high))
         told = has_priority(views, near, far, scene.lanes[row])
-        return told if told is not None else not self._cuts_in(row, graph)
+        return told if told is not None else self._is_off_lane(graph) or not self._cuts_in(row, graph)
+
+    def _is_off_lane(self, graph: Graph) -> bool:
+        window = graph.window
+        room = min(float(window.lane_left[BEHIND]), -float(window.lane_right[BEHIND]))
+        return 0.5 * self._shape.width - room > _OFF_LANE
 
     def _cuts_in(self, row: int, graph: Graph) -> bool:
         futures, first = graph.scene.futures, graph.first[row]

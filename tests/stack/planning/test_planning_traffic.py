@@ -312,3 +312,15 @@ def test_who_comes_by_a_bridge_is_no_reason_to_slow_down(lane: str) -> None:
     other = car(3, 100.0, -80.0, heading=UP, speed=12.0, lanes=(lane,))
     driven = drive(road(overpasses=[Overpass("bridge_0", 100.0, (100.0, 0.0))]), 12.0, speed=13.0, actors=[other])
     assert (driven.speeds.min() > 12.9) == (lane == "bridge_0")
+
+
+@pytest.mark.parametrize("speed", [6.0, 8.0])
+def test_where_its_line_comes_back_to_the_lane_the_ego_lets_those_on_the_lane_go_first(speed: float) -> None:
+    """After a turn that swings out beside the lane, it is the ego that cuts in, whoever changes place to its line."""
+    route = road()
+    is_beside = route.line.stations < 45.0
+    edges = {"lane_left": np.where(is_beside, 5.4, 1.6), "lane_right": np.where(is_beside, -0.1, -1.6)}
+    route = msgspec.structs.replace(route, **edges)
+    driven = drive(route, 12.0, station=5.0, actors=[car(7, -8.0, 5.2, heading=-0.15, speed=speed)])
+    assert driven.clearances.min() > 0.4  # what is accepted beside something
+    assert driven.fronts[-1] > 40.0
