@@ -114,6 +114,7 @@ def _overrides(configuration: Configuration, seed: int, begin: float) -> tuple[O
         ("duration-log.disable", "true", "terminal"),
         ("verbose", "false", "terminal"),
     ]
+    seconds(options.get("step-length", "1"), "step-length")  # one that is no time is told, though another is used
     if "no-internal-links" in options:
         wanted.append(("no-internal-links", "false", "junctions are driven over, not jumped"))
     if begin != seconds(options.get("begin", "0"), "begin"):
