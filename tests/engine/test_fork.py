@@ -332,7 +332,7 @@ def test_a_run_stays_in_one_thread_where_numpy_was_imported_before(tmp_path: Pat
 def test_a_system_that_cannot_fork_has_the_replay_engine(tmp_path: Path) -> None:
     script = (
         "import sys, dvca_sumo.api\n"
-        "for name in [name for name in sys.modules if name.startswith('dvca_sumo')]:\n"
+        "for name in [name for name in sys.modules if name.startswith('dvca_sumo.')]:\n"
         "    del sys.modules[name]\n"
         "sys.modules |= dict.fromkeys(['fcntl', 'resource'])\n"
         "sys.platform = 'win32'\n"
