@@ -31,7 +31,6 @@ from dvca_sumo.engine.passes import Pass, predicts_ideally, settled, summary
 from dvca_sumo.engine.processes import (
     Failure,
     adopt_orphans,
-    calculate_alone,
     death,
     ignore_interrupts,
     print_to_descriptors,
@@ -82,7 +81,6 @@ class Holder:
         adopt_orphans()
         make_own(self._log)
         print_to_descriptors()
-        calculate_alone()
         tempfile.tempdir = str(self._folder)  # the run's own folder goes with it, however this process ends
         try:
             with departed(task, roadmap_of, factory) as self._simulation:

@@ -32,8 +32,6 @@ Result = TypeVar("Result")
 
 _INTERRUPTS = (signal.SIGINT, signal.SIGTERM)  # of the terminal, and of what schedules batches
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
-# What numpy's builds of OpenBLAS call it.
-_SET_THREADS = ("openblas_set_num_threads", "scipy_openblas_set_num_threads", "scipy_openblas_set_num_threads64_")
 _SAID_LINES = 60  # of standard error that a failure keeps: SUMO's words stand before a traceback
 
 
@@ -131,7 +129,6 @@ def _work(job: Callable[[], object], sender: Connection, log: Path, parent: int)
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
     print_to_descriptors()
-    calculate_alone()
     try:
         answer = job()
     except Exception as error:  # noqa: BLE001 - whatever a job raises is its answer
@@ -155,21 +152,6 @@ def ignore_interrupts() -> None:
 def print_to_descriptors() -> None:
     """Let Python print where SUMO does: its own streams may be others (a notebook's, a test runner's)."""
     sys.stdout = sys.stderr = os.fdopen(2, "w", buffering=1, closefd=False)  # by the line: a crash flushes nothing
-
-
-def calculate_alone() -> None:
-    """Let numpy's linear algebra use this thread only, also where numpy was imported before this package (Linux only).
-
-    With several, sums of long arrays come out otherwise, and the process could not be forked any more.
-    """
-    maps = Path("/proc/self/maps")
-    lines = maps.read_text().splitlines() if sys.platform == "linux" else []
-    for path in {line.split(maxsplit=5)[-1] for line in lines if "openblas" in line}:
-        library = ctypes.CDLL(path)
-        for name in _SET_THREADS:
-            if hasattr(library, name):
-                library[name](1)
-                library.blas_thread_shutdown_()  # it may have started them just for that
 
 
 def raised_here(error: BaseException) -> Failure:

@@ -329,6 +329,17 @@ def test_a_run_stays_in_one_thread_where_numpy_was_imported_before(tmp_path: Pat
     assert python(script, tmp_path, OPENBLAS_NUM_THREADS="2") == "[(0, 1)]"
 
 
+@pytest.mark.parametrize("imports", ["numpy, dvca_sumo", "dvca_sumo, numpy"])
+def test_products_are_the_same_to_the_last_bit_however_many_threads_are_asked_for(tmp_path: Path, imports: str) -> None:
+    script = (
+        f"import hashlib, {imports}\n"
+        "values = numpy.random.default_rng(1).normal(size=(600, 2503))\n"
+        "print(hashlib.md5((values[:, :3] @ values[:3]).tobytes()).hexdigest())\n"
+    )
+    alone, several = (python(script, tmp_path, OPENBLAS_NUM_THREADS=threads) for threads in ("1", "2"))
+    assert alone == several
+
+
 def test_a_system_that_cannot_fork_has_the_replay_engine(tmp_path: Path) -> None:
     script = (
         "import sys, dvca_sumo.api\n"
