@@ -24,7 +24,7 @@ from dvca_sumo.analysis.attribution import Attribution
 from dvca_sumo.engine.fork import ForkEngine
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.engine.thinning import private_memory
-from dvca_sumo.scenario import Scenario, silenced
+from dvca_sumo.scenario import Scenario, input_words
 
 CASES = [
     ("nets/cs1.sumocfg", "perception.miss"),
@@ -62,10 +62,9 @@ def raw_wall(scenario: Scenario, end: float) -> float:
 
 def _raw(scenario: Scenario, end: float) -> float:
     with tempfile.TemporaryDirectory() as folder:
-        additionals = silenced(scenario.configuration.additionals, Path(folder))
-        words = ["-a", ",".join(map(str, additionals))] if additionals else []
+        files = input_words(scenario.configuration, Path(folder))
         begin = time.perf_counter()
-        libsumo.start(["sumo", *scenario.arguments, *words])
+        libsumo.start(["sumo", *scenario.arguments, *files])
         while libsumo.simulation.getTime() < end:
             libsumo.simulationStep()
         wall = time.perf_counter() - begin

@@ -17,8 +17,7 @@ import msgspec
 
 import dvca_sumo
 from dvca_sumo.engine.processes import Failure, isolated
-from dvca_sumo.scenario import Scenario
-from dvca_sumo.scenario.silence import silenced
+from dvca_sumo.scenario import Scenario, input_words
 
 LONG = 120.0  # [s]
 WAYS = ("as configured", "in world steps", "acting as configured")
@@ -42,15 +41,10 @@ def flow(scenario: Scenario, way: str, end: float) -> Flow:
         overrides["step-length"] = step
     if way == "acting as configured":
         overrides["default.action-step-length"] = step
-    read = scenario.configuration
     with tempfile.TemporaryDirectory() as folder:
-        net, *others = map(str, silenced((read.net, *read.additionals, *read.routes), Path(folder)))
-        additionals, routes = others[: len(read.additionals)], others[len(read.additionals) :]
-        files = ["-n", net]
-        for flag, names in (("-a", additionals), ("-r", routes)):
-            files += [flag, ",".join(names)] if names else []
+        files = input_words(scenario.configuration, Path(folder))
         options = [word for name, value in overrides.items() for word in (f"--{name}", value)]
-        libsumo.start(["sumo", "-c", str(read.path), *files, *options, "--no-warnings", "true"])
+        libsumo.start(["sumo", "-c", str(scenario.configuration.path), *files, *options, "--no-warnings", "true"])
         counts, stood, teleports, looked = [], set(), 0, scenario.begin
         while libsumo.simulation.getTime() < end:
             libsumo.simulationStep()

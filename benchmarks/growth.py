@@ -32,7 +32,7 @@ from dvca_sumo.engine.fork import ForkEngine
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.engine.thinning import private_memory
 from dvca_sumo.record import TICK, Record
-from dvca_sumo.scenario import Scenario, silenced
+from dvca_sumo.scenario import Scenario, input_words
 
 TRIPS = (30.0, 120.0, 600.0)  # [s] before the violation; the second is what flatness is held against
 SCALES = (0.25, 0.5, 1.0)
@@ -229,9 +229,9 @@ def _raw(scenario: Scenario, times: Sequence[float]) -> list[float]:
     """Wall times [s] at which libsumo alone gets to simulation `times` [s]."""
     walls = []
     with tempfile.TemporaryDirectory() as folder:
-        additionals = silenced(scenario.configuration.additionals, Path(folder))
+        files = input_words(scenario.configuration, Path(folder))
         begin = time.perf_counter()
-        libsumo.start(["sumo", *scenario.arguments, "-a", ",".join(map(str, additionals))])
+        libsumo.start(["sumo", *scenario.arguments, *files])
         for moment in times:
             while libsumo.simulation.getTime() < moment:
                 libsumo.simulationStep()

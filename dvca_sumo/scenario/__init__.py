@@ -10,7 +10,7 @@ from dvca_sumo.scenario.configuration import Configuration, read_configuration, 
 from dvca_sumo.scenario.departures import last_departure
 from dvca_sumo.scenario.ego import AUTO, Definitions, find_ego
 from dvca_sumo.scenario.errors import ScenarioError
-from dvca_sumo.scenario.silence import silenced
+from dvca_sumo.scenario.silence import input_words, silenced
 
 __all__ = [
     "AUTO",
@@ -19,6 +19,7 @@ __all__ = [
     "Override",
     "Scenario",
     "ScenarioError",
+    "input_words",
     "last_departure",
     "load_scenario",
     "silenced",
@@ -52,7 +53,7 @@ class Scenario(msgspec.Struct, frozen=True):
 
     @property
     def arguments(self) -> tuple[str, ...]:
-        """SUMO's command line, but for its input files (see `silenced`)."""
+        """SUMO's command line, but for its input files (see `input_words`)."""
         words = ["-c", str(self.configuration.path)]
         for override in self.overrides:
             words += [f"--{override.option}", override.used]

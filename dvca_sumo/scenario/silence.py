@@ -10,6 +10,7 @@ import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+from dvca_sumo.scenario.configuration import Configuration
 from dvca_sumo.scenario.errors import ScenarioError
 from dvca_sumo.scenario.texts import opened_text
 
@@ -47,6 +48,19 @@ def silenced(files: tuple[Path, ...], folder: Path) -> tuple[Path, ...]:
         ScenarioError: A file to be copied is not well-formed XML.
     """
     return tuple(_silenced(path, folder / str(number)) for number, path in enumerate(files))
+
+
+def input_words(configuration: Configuration, folder: Path, *additionals: Path) -> list[str]:
+    """SUMO's words for a configuration's net, additional and route files, silenced, and for more additional ones.
+
+    Raises:
+        ScenarioError: As `silenced`.
+    """
+    read = configuration
+    net, *others = silenced((read.net, *read.additionals, *read.routes), folder)
+    count = len(read.additionals)
+    kinds = {"-n": [net], "-a": [*others[:count], *additionals], "-r": others[count:]}
+    return [word for kind, files in kinds.items() if files for word in (kind, ",".join(map(str, files)))]
 
 
 def _silenced(path: Path, folder: Path) -> Path:

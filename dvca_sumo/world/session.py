@@ -19,7 +19,7 @@ import numpy as np
 import traci.constants as tc
 
 from dvca_sumo.messages import ObjectClass, SignalColour
-from dvca_sumo.scenario import Scenario, ScenarioError, silenced
+from dvca_sumo.scenario import Scenario, ScenarioError, input_words
 from dvca_sumo.truth import EgoTruth, ObjectsTruth
 from dvca_sumo.world.crowd import Body, Crowd
 from dvca_sumo.world.entry import Entry
@@ -70,11 +70,7 @@ class Session:
             raise ScenarioError("a simulation is already loaded in this process")
         types = folder / "ego.add.xml"
         types.write_text(f'<additional><vType id="{NEVER_TELEPORTED}" timeToTeleport="-1"/></additional>')
-        read = scenario.configuration
-        net, *others = map(str, silenced((read.net, *read.additionals, *read.routes), folder))
-        additionals, routes = others[: len(read.additionals)], others[len(read.additionals) :]
-        files = ["-n", net, "-a", ",".join((*additionals, str(types)))]
-        files += ["-r", ",".join(routes)] if routes else []
+        files = input_words(scenario.configuration, folder, types)
         try:
             libsumo.start(["sumo", *scenario.arguments, *files])
         except _GIVES_UP as error:
