@@ -52,12 +52,15 @@ class Passing:
         self, way: LaneChange, window: Window, offset: float, speed: float, objects: TrackedObjects
     ) -> LaneChoice | None:
         config, shape = self._config, self._shape
+        wanted = config.cruise_fraction * float(window.speed_limits[BEHIND])
+        left = way.latest_station - window.station - shape.front
+        is_short = left < config.passing_room * wanted
+        if self._lane == self._target == _OWN and is_short:
+            return None
         aside = np.abs(offset - way.centres(np.array([window.station]))[:, 0])
         if aside[self._target] < ARRIVED:
             self._lane = self._target
-        wanted = config.cruise_fraction * float(window.speed_limits[BEHIND])
-        left = way.latest_station - window.station - shape.front
-        if self._lane == self._target == _OWN and (left < config.passing_room * wanted or aside[_OWN] > ARRIVED):
+        if self._lane == self._target == _OWN and (is_short or aside[_OWN] > ARRIVED):
             return None
         occupied = self._gaps.occupied(way, window.station, objects)
         stop = last_stop(way, window, 1, speed, shape, config)

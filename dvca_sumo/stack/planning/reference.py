@@ -4,7 +4,6 @@ import math
 
 import msgspec
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from dvca_sumo.messages import Floats, Integers, VehicleShape
 from dvca_sumo.roadmap.route import Route
@@ -176,17 +175,17 @@ def swept(x: Floats, y: Floats, headings: Floats, line: Floats, shape: VehicleSh
     """
     half, metres = 0.5 * shape.width, math.ceil(shape.front) + 1
     count = len(x) - metres + 1
-    ahead = np.minimum(np.arange(metres, dtype=np.float64), shape.front)  # of the axle, each a station farther
-    axle = (y - line[1]) * line[2] - (x - line[0]) * line[3]
-    x_ahead, y_ahead, cosines, sines = sliding_window_view(line, metres, axis=1)
-    turned = headings[:count, None]
-    offsets = (y[:count, None] + ahead * np.sin(turned) - y_ahead) * cosines
-    offsets -= (x[:count, None] + ahead * np.cos(turned) - x_ahead) * sines
-    left, right = axle.copy(), axle
-    for metre in range(1, metres):
+    ahead = np.minimum(np.arange(1.0, metres), shape.front)[:, None]  # of the axle, each a station farther
+    left = (y - line[1]) * line[2] - (x - line[0]) * line[3]
+    right = left.copy()
+    x_ahead, y_ahead, cosines, sines = line.take(np.arange(1, metres)[:, None] + np.arange(count), axis=1)
+    turned = headings[:count]
+    offsets = (y[:count] + ahead * np.sin(turned) - y_ahead) * cosines
+    offsets -= (x[:count] + ahead * np.cos(turned) - x_ahead) * sines
+    for metre, offset in enumerate(offsets, 1):
         part = slice(metre, metre + count)
-        np.maximum(left[part], offsets[:, metre], out=left[part])
-        np.minimum(right[part], offsets[:, metre], out=right[part])
+        np.maximum(left[part], offset, out=left[part])
+        np.minimum(right[part], offset, out=right[part])
     return left + half, right - half
 
 
