@@ -21,8 +21,9 @@ _OFF_LANE = 0.5  # [m] of the body beyond the edge of its lane, by the line, not
 _STAYS = 2  # columns of the graph, after which somebody is on the path to drive along it
 _HARD_GAP = 0.5  # [m] to the other's way, defended by hard braking
 _LEAST_ROOM = 0.1  # [m]
-_BESIDE_PERSON = 1.0  # [m] behind the front bumper, an ego that moves no faster than ...
-_CREEPING = 1.5  # ... [m/s] stands still for people who come up to its side
+_CREEPING = 1.5  # [m/s] no faster, an ego stands still for people who come up to its side: ...
+_BESIDE_PERSON = 1.0  # ... [m] behind its front bumper, and all along it ...
+_BRUSHING = 0.2  # ... for those who would come so near to it [m]
 _CLEAR_GAP = 0.5  # [m] lengthwise behind somebody who has passed
 _AT_LINE = 0.5  # [m] past the stop line the ego may still wait at it
 
@@ -76,14 +77,24 @@ class Meetings:
             return None
         stop = self._stop(row, graph, views if others_first else [])
         room = stop.at + stop.give
-        is_person = graph.scene.classes[graph.scene.owners[row]] == _PERSON
-        beside = _BESIDE_PERSON if is_person and profile.speeds[0] < _CREEPING else 0.0
-        if room <= -_HARD_GAP - beside:  # stopping there would not help
+        if not self._helps(room, row, graph, profile):
             return None
         is_too_late = profile.speeds[0] ** 2 / (2.0 * max(room, _LEAST_ROOM)) > config.hard_braking
         if is_too_late and self._passes([row], graph, profile, 0.0)[0]:
             return None
         return Demand(row, stop, follows=self._joins(row, graph))
+
+    def _helps(self, room: float, row: int, graph: Graph, profile: Profile) -> bool:
+        """Whether to stop with so much `room` [m] before the other's way keeps the ego out of it."""
+        if room > -_HARD_GAP:
+            return True
+        if profile.speeds[0] >= _CREEPING:
+            return False
+        if graph.scene.classes[graph.scene.owners[row]] == _PERSON:
+            brushes = bool((graph.gaps[row][graph.occupied[row]] < _BRUSHING).any())
+            return room > -_HARD_GAP - (self._shape.length if brushes else _BESIDE_PERSON)
+        # Who passes close before the nose does not touch it; an ego that went on would touch them.
+        return self._shape.front < graph.contact(row, 0.0) < float(graph.path.arcs[-1])
 
     def _will_wait(self, row: int, entry: float, graph: Graph) -> bool:
         """Whether who has to give way, and is on the path at `entry` [s], may still stop: unless it speeds up."""
@@ -161,7 +172,7 @@ class Meetings:
             if last == len(scene.times) - 1:
                 until = math.inf
         if nearest - _HARD_GAP <= front:  # its near end comes by; what gets into the way may do so further on
-            nearest = graph.contact(row)
+            nearest = graph.contact(row, float(graph.margins[row]))
         at = nearest - gap - front
         for line, distance, _, _ in views:
             is_within = distance - 1.0 <= nearest - front <= distance + line.exit_station - line.station

@@ -44,8 +44,10 @@ class Graph(msgspec.Struct, frozen=True, eq=False):
         track: int = self.scene.ids[self.scene.owners[row]]
         return track
 
-    def contact(self, row: int) -> float:
-        """The first arc at which the body meets who moves, as future `row` has it; the path's last arc where nowhere.
+    def contact(self, row: int, margin: float) -> float:
+        """The first arc at which who moves, as future `row` has it, is within `margin` [m] of the body's way.
+
+        It is the path's last arc where that is nowhere.
 
         That may lie beyond the near end of what passes aslant beside the ego, and draws near only further on.
         """
@@ -54,7 +56,7 @@ class Graph(msgspec.Struct, frozen=True, eq=False):
         boxes[:, :3] = scene.poses[row, columns]
         stations, gaps = _closely(boxes, self.window, self.path)
         count = len(self.path.arcs)
-        nearest = stations[gaps < self.margins[row]].min(initial=count)
+        nearest = stations[gaps < margin].min(initial=count)
         return float(np.interp(nearest, np.arange(count), self.path.arcs))
 
 
@@ -165,7 +167,8 @@ def _margins(scene: Scene, window: Window, crossings: tuple[Crossing, ...], conf
 def leading(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> tuple[list[int], list[int]]:
     """Moving futures on the path, as rows of the graph: those that lead (or come towards) the ego, and the rest.
 
-    Left out are unlikely ones that are not about to happen, and who drives behind the ego.
+    Left out are unlikely ones that are not about to happen, and who drives behind the ego. People beside it do not
+    lead it.
     """
     scene = graph.scene
     rows = np.flatnonzero(graph.occupied[: scene.moving].any(axis=1))
@@ -173,15 +176,18 @@ def leading(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> tuple[
         return [], []
     is_in_lane = (graph.gaps[rows, 0] < config.object_margin).tolist()
     is_ahead = (scene.futures.stations[rows, 0] > shape.centre).tolist()
+    is_beside = (scene.classes[scene.owners[rows]] == _PERSON) & (graph.low[rows, 0] < shape.front)
     chances = scene.probabilities[rows].tolist()
     leaders: list[int] = []
     others: list[int] = []
-    for row, in_lane, ahead, chance in zip(rows.tolist(), is_in_lane, is_ahead, chances, strict=True):
+    for row, in_lane, ahead, beside, chance in zip(
+        rows.tolist(), is_in_lane, is_ahead, is_beside.tolist(), chances, strict=True
+    ):
         first = graph.first[row]
         entry = float(scene.times[first])
         if chance < (config.possible if entry < config.soon else config.likely):
             continue
-        if abs(scene.futures.directions[row, first]) < ALONG or (entry > PRESENT and not in_lane):
+        if beside or abs(scene.futures.directions[row, first]) < ALONG or (entry > PRESENT and not in_lane):
             others.append(row)
         elif ahead:
             (leaders if entry <= PRESENT else others).append(row)

@@ -124,6 +124,16 @@ def test_ego_does_not_start_while_a_person_walks_up_to_its_front_corner(x: float
     assert driven.fronts[-1] > 120.0
 
 
+@pytest.mark.parametrize("x", [103.5, 102.5, 101.5])
+def test_ego_does_not_start_while_a_person_walks_along_its_side_and_into_it(x: float) -> None:
+    """Standing, it is walked into; moving, it would be the one that touches the person."""
+    walker = person(3, x, -1.75, heading=math.pi - 0.2, speed=1.2)
+    driven = drive(road(), 12.0, station=100.0, actors=[walker])
+    is_alongside = driven.states[:, 0] < (x - 99.1) / 1.2
+    assert driven.speeds[is_alongside].max() == 0.0
+    assert driven.fronts[-1] > 120.0
+
+
 def test_person_who_is_long_across_before_the_ego_comes_is_no_reason_to_stop() -> None:
     driven = drive(road(), 15.0, speed=10.0, actors=[person(3, 140.0, -2.0, heading=UP, speed=1.4)])
     assert driven.speeds.min() > 9.5
@@ -163,6 +173,25 @@ def test_ego_half_way_round_a_left_turn_waits_for_who_comes_past_it_and_then_acr
     assert driven.clearances.min() > 0.5
     assert driven.states[-1, 2] > 40.0
     assert_drivable(driven)
+
+
+@pytest.mark.parametrize(
+    ("radius", "station", "y", "heading", "speed"),
+    [
+        (10.0, 106.0, 3.6, 0.0, 6.0),
+        (10.0, 106.0, 6.0, 0.1, 4.0),
+        (12.0, 108.0, 4.2, 0.0, 4.0),
+        (12.0, 110.0, 5.4, 0.0, 6.0),
+    ],
+)
+def test_ego_that_stands_in_a_left_turn_stays_there_while_a_bus_passes_close_before_its_nose(
+    radius: float, station: float, y: float, heading: float, speed: float
+) -> None:
+    junction = stop_line(101.0, Control.YIELD, exit_station=126.0)
+    bus = car(3, 130.0, y, heading=math.pi + heading, speed=speed, size=(12.0, 2.5), lanes=("major_0",))
+    driven = drive(road(curve_points(radius), stop_lines=[junction]), 15.0, station=station, actors=[bus])
+    assert driven.clearances.min() > 0.2
+    assert driven.states[-1, 2] > 40.0
 
 
 def test_who_drives_along_on_the_inner_lane_of_a_roundabout_is_no_reason_to_slow_down() -> None:
