@@ -1,9 +1,11 @@
 """What the simulator does that no driver survives.
 
-The rule: a body appears within sight without having come there (it was inserted, or teleported), or moves farther in
-one step than its speed allows (a jump; SUMO's lane changes are such jumps), and at that moment it touches the ego, or
-it is so close in the ego's way that full braking after a reaction would not keep the ego off it. For a while after,
-violations with that body are the simulator's doing.
+The rule: a body appears within sight without having come there (it was inserted, or teleported), or one of its ends
+moves farther in one step than its speed allows (a jump; SUMO's lane changes are such jumps, and so are its turns on the
+spot), and at that moment it touches the ego, or it is so close in the ego's way that full braking after a reaction
+would not keep the ego off it. Or a person walks into an ego that has stood for a second: SUMO's people see vehicles on
+crossings from afar, and walk through those that stand. For a while after, violations with that body are the simulator's
+doing.
 """
 
 import math
@@ -12,7 +14,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.boxes import distances
-from dvca_sumo.messages import Integers
+from dvca_sumo.messages import Integers, ObjectClass
 from dvca_sumo.oracles import Places
 from dvca_sumo.oracles.ahead import ahead
 from dvca_sumo.truth import Moment, ObjectsTruth
@@ -22,7 +24,9 @@ LEAP = 1.0  # [m] in one step, beyond what the greater of its speeds before and 
 REACTION = 0.5  # [s]
 BRAKING = 8.0  # [m/s^2]
 TOUCHING = 0.2  # [m]
+STOOD = 1.0  # [s]
 LASTING = 5.0  # [s]
+_STANDING = 0.1  # [m/s]
 
 
 class Disturbance(msgspec.Struct, frozen=True):
@@ -30,7 +34,7 @@ class Disturbance(msgspec.Struct, frozen=True):
 
     time: float  # [s]
     object: str
-    how: str  # "appeared" or "jumped"
+    how: str  # "appeared", "jumped", or "walked into the standing ego"
 
 
 class Disturbances:
@@ -42,6 +46,7 @@ class Disturbances:
         self._places = places
         self._before: ObjectsTruth | None = None
         self._rows: dict[str, int] = {}  # by name, in the moment before
+        self._drove = -math.inf  # [s] when the ego last moved
 
     def see(self, moment: Moment) -> None:
         """Take in the next moment. To an ego that has just departed, every body has just appeared."""
@@ -61,6 +66,11 @@ class Disturbances:
         for how, candidates in (("appeared", appeared), ("jumped", jumped)):
             for row in self._too_near(moment, candidates):
                 self.found.append(Disturbance(moment.time, names[row], how))
+        if abs(moment.ego.speed) >= _STANDING:
+            self._drove = moment.time
+        elif moment.time - self._drove >= STOOD:
+            for row in self._walking_in(moment):
+                self.found.append(Disturbance(moment.time, names[row], "walked into the standing ego"))
         self._before, self._rows = objects, rows
 
     def explain(self, name: str | None, time: float) -> Disturbance | None:
@@ -85,6 +95,15 @@ class Disturbances:
         needed = REACTION * closing + closing * closing / (2.0 * BRAKING)
         return sorted({*touching, *found.rows[found.gaps < needed].tolist()})
 
+    def _walking_in(self, moment: Moment) -> list[int]:
+        people = np.flatnonzero(moment.objects.classes == ObjectClass.PEDESTRIAN)
+        if people.size == 0:
+            return []
+        touching: list[int] = people[
+            distances(self._places.at(moment).box, moment.objects.boxes[people]) <= 0.0
+        ].tolist()
+        return touching
+
 
 def _leaps(now: ObjectsTruth, rows: Integers, before: ObjectsTruth, rows_before: Integers) -> Integers:
     """Where among `rows` bodies are that went farther than they can; (k,) each."""
@@ -93,13 +112,14 @@ def _leaps(now: ObjectsTruth, rows: Integers, before: ObjectsTruth, rows_before:
         np.hypot(now.velocities[rows, 0], now.velocities[rows, 1]),
         np.hypot(before.velocities[rows_before, 0], before.velocities[rows_before, 1]),
     )
-    moved = _fronts(now)[rows] - _fronts(before)[rows_before]
-    found: Integers = np.flatnonzero(np.hypot(moved[:, 0], moved[:, 1]) > speeds * passed + LEAP)
+    moved = _ends(now)[:, rows] - _ends(before)[:, rows_before]
+    farthest = np.hypot(moved[:, :, 0], moved[:, :, 1]).max(axis=0)
+    found: Integers = np.flatnonzero(farthest > speeds * passed + LEAP)
     return found
 
 
-def _fronts(objects: ObjectsTruth) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Where bodies touch the road first: (n, 2); SUMO moves vehicles by their fronts."""
+def _ends(objects: ObjectsTruth) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """Where bodies begin and end: (2, n, 2). SUMO moves vehicles by their fronts, and has them turn about those."""
     boxes = objects.boxes
-    half = 0.5 * boxes[:, 3]
-    return np.stack([boxes[:, 0] + half * np.cos(boxes[:, 2]), boxes[:, 1] + half * np.sin(boxes[:, 2])], axis=1)
+    half = 0.5 * boxes[:, 3] * np.array([[1.0], [-1.0]])
+    return np.stack([boxes[:, 0] + half * np.cos(boxes[:, 2]), boxes[:, 1] + half * np.sin(boxes[:, 2])], axis=2)

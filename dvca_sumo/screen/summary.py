@@ -43,7 +43,8 @@ class DriverSummary(msgspec.Struct, frozen=True):
 
     trips: int  # that were driven
     not_driven: int
-    completed: Share
+    ended_by_simulator: int  # by a contact of its doing: counted apart
+    completed: Share  # of the others
     km: float
     hours: float
     outcomes: dict[str, int]
@@ -72,11 +73,13 @@ def summary_of(results: Sequence[TripResult], like: Sequence[TripResult]) -> Dri
         for trip in trips
         if trip.outcome is TripOutcome.ARRIVED and reference.get(trip.ego, 0.0) > 0.0
     ]
+    ended = sum(_is_ended_by_simulator(trip) for trip in trips)
     nearest = [trip.least_ttc for trip in trips if trip.least_ttc is not None]
     return DriverSummary(
         trips=len(trips),
         not_driven=len(results) - len(trips),
-        completed=share_of(sum(trip.outcome is TripOutcome.ARRIVED for trip in trips), len(trips)),
+        ended_by_simulator=ended,
+        completed=share_of(sum(trip.outcome is TripOutcome.ARRIVED for trip in trips), len(trips) - ended),
         km=km,
         hours=sum(trip.duration for trip in trips) / 3600.0,
         outcomes=dict(Counter(trip.outcome.value for trip in results)),
@@ -94,6 +97,12 @@ def summary_of(results: Sequence[TripResult], like: Sequence[TripResult]) -> Dri
         least_ttc=_quartiles(nearest),
         ttc_below={str(limit): share_of(sum(ttc < limit for ttc in nearest), len(trips)) for limit in NEAR},
     )
+
+
+def _is_ended_by_simulator(trip: TripResult) -> bool:
+    if trip.outcome is not TripOutcome.CONTACT:
+        return False
+    return any(one.violation.contact is not None and one.fault is Fault.SIMULATOR for one in trip.violations)
 
 
 def _oracle(kind: str, trips: Sequence[TripResult], km: float) -> OracleSummary:

@@ -158,7 +158,8 @@ def _range(values: Quartiles) -> str:
 
 _ROWS: Sequence[tuple[str, Callable[[DriverSummary], str]]] = (
     ("trips driven", lambda one: str(one.trips)),
-    ("completed", lambda one: _share(one.completed)),
+    ("ended by the simulator", lambda one: str(one.ended_by_simulator)),
+    ("completed, of the others", lambda one: _share(one.completed)),
     ("km", lambda one: f"{one.km:.1f}"),
     ("at-fault collisions", lambda one: str(one.at_fault_collisions)),
     ("at-fault violations", lambda one: str(one.at_fault_violations)),

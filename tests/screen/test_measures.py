@@ -1,11 +1,15 @@
 """What is measured, and what is told apart: the simulator's doing, the other one's, the driver's."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
+import msgspec
+import numpy as np
 import pytest
 from screen_scenes import LANE_Y, Row, cruise, moment, places
 
+from dvca_sumo.messages import ObjectClass
 from dvca_sumo.oracles.collision import Collision
 from dvca_sumo.oracles.speed_limit import SpeedLimit
 from dvca_sumo.roadmap import RoadMap
@@ -45,6 +49,15 @@ def at_contact(moments: Sequence[Moment], roads: RoadMap) -> list[tuple[str, Fau
         watch.see(one)
     found = judged([oracle.conclude(Ending.CUT)], watch, moments[-1], roads)
     return [(one.violation.kind, one.fault) for one in found]
+
+
+def on_foot(one: Moment) -> Moment:
+    """The same, the others being people."""
+    objects = one.objects
+    boxes = objects.boxes.copy()
+    boxes[:, 3:] = 0.5
+    classes = np.full_like(objects.classes, int(ObjectClass.PEDESTRIAN))
+    return msgspec.structs.replace(one, objects=msgspec.structs.replace(objects, boxes=boxes, classes=classes))
 
 
 def test_way_and_time_are_those_of_the_drive(roads: RoadMap) -> None:
@@ -88,6 +101,31 @@ def test_a_body_that_jumps_into_the_way_is_and_one_that_drives_there_is_not(road
         for k in range(8)
     ]
     assert disturbances(slowly, roads) == []
+
+
+def test_a_body_that_turns_on_the_spot_sweeps_over_the_road_at_no_speed_of_its_own(roads: RoadMap) -> None:
+    """Its front hardly moves: its rear leaps into the way."""
+
+    def turned(time: float, heading: float) -> Moment:
+        one = moment(time, 50.0 + 5.0 * time, 5.0, [("car", (0.0, 0.0), 0.0)])
+        x, y = 54.0 - 2.3 * math.cos(heading), LANE_Y + 3.5 - 2.3 * math.sin(heading)
+        boxes = np.array([[x, y, heading, 4.6, 1.8]])
+        return msgspec.structs.replace(one, objects=msgspec.structs.replace(one.objects, boxes=boxes))
+
+    assert disturbances([turned(0.0, -math.pi / 2.0), turned(0.1, math.pi / 2.0)], roads) == [("car", "jumped")]
+    slowly = [turned(0.1 * k, -math.pi / 2.0 + 0.1 * k) for k in range(20)]
+    assert disturbances(slowly, roads) == []
+
+
+@pytest.mark.parametrize(("stood", "fault"), [(0.5, Fault.OTHER), (2.0, Fault.SIMULATOR)])
+def test_a_person_who_walks_into_an_ego_that_has_stood_is_the_simulators_doing(
+    roads: RoadMap, stood: float, fault: Fault
+) -> None:
+    moments, steps = cruise(1.0, 4.0), round(10.0 * stood)
+    for k in range(1, steps + 1):
+        walker: Row = ("person:p", (42.0, LANE_Y - 1.1 - 0.12 * (steps - k)), 1.2)
+        moments.append(moment(1.0 + 0.1 * k, 44.0, 0.0, [walker]))
+    assert at_contact([on_foot(one) for one in moments], roads) == [("collision", fault)]
 
 
 def test_a_jump_behind_or_far_beside_changes_nothing(roads: RoadMap) -> None:

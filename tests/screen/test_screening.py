@@ -18,7 +18,7 @@ from dvca_sumo.screen.tables import has_failed, has_gaps, json_of, terminal_text
 from dvca_sumo.screen.trips import Draw
 from dvca_sumo.stack.sources import StackSource
 from dvca_sumo.store import Store
-from dvca_sumo.violations import Category, Violation
+from dvca_sumo.violations import Category, Contact, Violation
 
 ROUTES = """<vType id="bus" vClass="bus"/>
 <trip id="first" from="ab" to="bc" depart="1" departPos="last"/>
@@ -94,6 +94,16 @@ def test_each_violation_comes_with_a_command_that_reproduces_it(
     said = typed(*words, "--json")
     assert chosen["kind"] in {one["kind"] for one in said.result["violations"]}, said.err
     assert chosen["command"] in terminal_text(reckless)
+
+
+def test_a_trip_that_the_simulator_ended_is_counted_apart() -> None:
+    contact = Violation("collision", Category.SAFETY, 5.0, "x", (0.0, 0.0), "ab_0", 0.0, 0.0, "", Contact.ACTIVE_FRONT)
+    trips = [TripResult("arrived", TripOutcome.ARRIVED)]
+    trips += [
+        TripResult(fault, TripOutcome.CONTACT, violations=(Judged("collision", contact, fault, ""),)) for fault in Fault
+    ]
+    found = summary_of(trips, [])
+    assert (found.trips, found.ended_by_simulator, found.completed.count, found.completed.total) == (4, 1, 1, 3)
 
 
 def test_the_text_puts_both_drivers_side_by_side(reckless: Screening) -> None:
