@@ -5,12 +5,14 @@ models for vehicle tracking (2008).
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
 
 from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.boxes import box_of, contact_times, distances
+from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.oracles.ahead import ahead
 from dvca_sumo.oracles.findings import Findings
@@ -20,8 +22,10 @@ from dvca_sumo.truth import Moment, ObjectsTruth
 from dvca_sumo.violations import Category, Ending, Judgement, Violation
 
 Flags = npt.NDArray[np.bool_]
+Motion = Callable[[float], tuple[float, float, float]]  # where a body is after so many seconds: x, y, heading
 
-_STEP = 0.05  # [s] between the places on their arcs where two are compared
+_STEP = 0.05  # [s] between the places where two are compared
+_ALIGNED = 0.1  # [rad] between a body and the lane it drives along
 
 
 class TimeToCollision:
@@ -31,7 +35,8 @@ class TimeToCollision:
     direction); along the route, the gap to an object in the ego's strip over the closing speed, which
     also holds in a curve. Not judged: a slow ego, objects wholly behind one that drives forwards (the
     hazard is the follower's), and boxes that touch already (that is a collision). Nor is a contact that
-    does not come about when both go on turning as they do: two cars that pass each other in a bend.
+    does not come about when both go on turning as they do, or when the other goes on along the lane it
+    drives along: two cars that pass each other in a bend, or where lanes of straight pieces have a corner.
     """
 
     kind = "ttc"
@@ -59,7 +64,7 @@ class TimeToCollision:
             names[row]: min(ahead_on, following)
             for row, ahead_on, following in zip(rows.tolist(), straight.tolist(), along.tolist(), strict=True)
             if min(ahead_on, following) > 0.0
-            and (following < horizon or (ahead_on < horizon and _meet_turning(moment, row, before, horizon)))
+            and (following < horizon or (ahead_on < horizon and self._meet(moment, row, before)))
         }
         since = {name: self._since.get(name, moment.time) for name in soon}
         for name, begun in since.items():
@@ -69,6 +74,16 @@ class TimeToCollision:
                 self._findings.add(self._findings.made(moment, detail, soon[name], self._horizon, counterpart=name))
         self._since = since
         return self._findings.next()
+
+    def _meet(self, moment: Moment, row: int, before: ObjectsTruth | None) -> bool:
+        """Whether they touch however the object is taken to go on."""
+        objects, horizon = moment.objects, self._horizon
+        size = objects.boxes[row, 3:]
+        if not _is_touched(moment, size, _turning(objects, row, before), horizon):
+            return False
+        line = self._places.line(objects.lanes[row]) if objects.lanes else None
+        motion = None if line is None else _along(line, objects, row)
+        return motion is None or _is_touched(moment, size, motion, horizon)
 
     def conclude(self, ended: Ending) -> Judgement:  # noqa: ARG002  the answer holds for whatever part was seen
         """See `Oracle`."""
@@ -108,24 +123,44 @@ class TimeToCollision:
         times[rows.searchsorted(leaders.rows[is_closing])] = leaders.gaps[is_closing] / closing[is_closing]
 
 
-def _meet_turning(moment: Moment, row: int, before: ObjectsTruth | None, horizon: float) -> bool:
-    """Whether ego and object touch within `horizon` [s] when both go on turning as they did since `before`."""
-    ego, objects = moment.ego, moment.objects
-    x, y, heading, *_ = objects.boxes[row].tolist()
-    rate = 0.0
-    if before is not None and moment.time > before.time and objects.ids[row] in before.ids:
-        known = before.boxes[before.ids.index(objects.ids[row]), 2]
-        rate = wrapped(heading - float(known)) / (moment.time - before.time)
-    east, north = objects.velocities[row].tolist()
-    speed, course = math.hypot(east, north), math.atan2(north, east)
-    boxes = objects.boxes[[row]]
+def _is_touched(moment: Moment, size: Floats, motion: Motion, horizon: float) -> bool:
+    """Whether the ego, turning as it does, touches a body of `size` (2,) within `horizon` [s]."""
+    ego = moment.ego
+    box = np.empty((1, 5))
+    box[0, 3:] = size
     for time in np.arange(_STEP, horizon + _STEP, _STEP).tolist():
         place = _moved(ego.x, ego.y, ego.speed, ego.heading, ego.yaw_rate, time)
-        boxes[0, :2] = _moved(x, y, speed, course, rate, time)
-        boxes[0, 2] = heading + rate * time
-        if distances(box_of(*place, ego.heading + ego.yaw_rate * time, moment.shape), boxes)[0] <= 0.0:
+        box[0, :3] = motion(time)
+        if distances(box_of(*place, ego.heading + ego.yaw_rate * time, moment.shape), box)[0] <= 0.0:
             return True
     return False
+
+
+def _turning(objects: ObjectsTruth, row: int, before: ObjectsTruth | None) -> Motion:
+    """On, as fast as now and turning as since `before`."""
+    x, y, heading, *_ = objects.boxes[row].tolist()
+    rate = 0.0
+    if before is not None and objects.time > before.time and objects.ids[row] in before.ids:
+        known = before.boxes[before.ids.index(objects.ids[row]), 2]
+        rate = wrapped(heading - float(known)) / (objects.time - before.time)
+    east, north = objects.velocities[row].tolist()
+    speed, course = math.hypot(east, north), math.atan2(north, east)
+    return lambda time: (*_moved(x, y, speed, course, rate, time), heading + rate * time)
+
+
+def _along(line: Polyline, objects: ObjectsTruth, row: int) -> Motion | None:
+    """On, as fast as now and beside `line` as now; None where it does not drive along that."""
+    x, y, heading, *_ = objects.boxes[row].tolist()
+    (station,), (offset,) = line.project([[x, y]])
+    speed = math.hypot(*objects.velocities[row].tolist())
+    if abs(wrapped(heading - float(line.poses([station])[0, 2]))) > _ALIGNED:
+        return None
+
+    def motion(time: float) -> tuple[float, float, float]:
+        x, y, heading = line.poses([station + speed * time], offset)[0].tolist()
+        return x, y, heading
+
+    return motion
 
 
 def _moved(x: float, y: float, speed: float, course: float, rate: float, time: float) -> tuple[float, float]:

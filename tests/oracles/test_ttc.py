@@ -1,14 +1,19 @@
 import math
+from types import SimpleNamespace
+from typing import ClassVar, cast
 
+import msgspec
 import numpy as np
 import pytest
-from oracle_scenes import FRONT, Row, car, drive, judged, moment, moment_at, road_along
+from oracle_scenes import FRONT, BareMap, Row, car, drive, judged, moment, moment_at, road_along, straight_road
 
 from dvca_sumo.geometry.polyline import Polyline
+from dvca_sumo.oracles.place import Places
 from dvca_sumo.oracles.ttc import TimeToCollision
+from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import Moment
-from dvca_sumo.violations import Answer
+from dvca_sumo.violations import Answer, Ending
 
 AT_ONCE = Thresholds(ttc_dwell=0.0)
 
@@ -120,3 +125,29 @@ def test_two_cars_that_turn_past_each_other_are_no_hazard(turn_rate: float, expe
         oncoming: Row = ("oncoming", (56.5 - 0.2 * step, 2.9, course, 4.6, 1.8), velocity)
         moments.append(moment(time, 50.0, 3.0, objects=[oncoming]))
     assert judged(TimeToCollision, moments).answer is expected
+
+
+@pytest.mark.parametrize(("drifts", "expected"), [(False, Answer.KEPT), (True, Answer.VIOLATED)])
+def test_who_drives_round_the_corner_of_its_own_lane_is_no_hazard(*, drifts: bool, expected: Answer) -> None:
+    """Lanes of a map are straight pieces: up to the corner the oncoming car points at the ego and does not turn."""
+    slope = math.radians(32.0)
+    begin = [73.9, 3.0 if drifts else 3.0 + 22.0 * math.tan(slope)]
+    lane = Polyline([begin, [51.9, 3.0], [0.0, 3.0]])
+
+    class Map(BareMap):
+        """One lane."""
+
+        lanes: ClassVar = {"out_0": SimpleNamespace(line=lane)}
+
+    oracle = TimeToCollision(Places(straight_road(), cast("RoadMap", Map())), Thresholds())
+    course = math.pi + slope
+    for step in range(4):
+        way = 1.2 * step
+        oncoming: Row = (
+            "oncoming",
+            (57.0 + way * math.cos(course), 3.0 + 5.1 * math.tan(slope) + way * math.sin(course), course, 5.0, 1.8),
+            (12.0 * math.cos(course), 12.0 * math.sin(course)),
+        )
+        one = moment(0.1 * step, 48.0 + 0.7 * step, 7.0, objects=[oncoming])
+        oracle.observe(msgspec.structs.replace(one, objects=msgspec.structs.replace(one.objects, lanes=("out_0",))))
+    assert oracle.conclude(Ending.TIME_OVER).answer is expected
