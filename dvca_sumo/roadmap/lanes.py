@@ -64,6 +64,8 @@ class Junction(msgspec.Struct, frozen=True, eq=False):
     foes: dict[int, str]  # by link index: bits, that of link 0 last; "1" where paths conflict
     responses: dict[int, str]  # likewise; "1" where the other has priority
     crossings: tuple[str, ...]  # lane ids of pedestrian crossings
+    outline: tuple[tuple[float, float], ...]  # [m] as drawn; () in a net that does not
+    walking: tuple[tuple[tuple[float, float], ...], ...]  # [m] outlines of the areas of it that are for people on foot
 
     def conflicting(self, movement: Movement) -> frozenset[str]:
         """Lanes of all movements whose paths conflict with `movement`'s."""

@@ -3,6 +3,7 @@
 sumolib's own objects refer to each other in cycles and cannot be pickled; nothing of them is kept.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,8 @@ def read_net(path: Path, vehicle_class: str) -> NetContents:
     is_left_hand = _is_left_hand(edges)
     lanes = {lane.id: lane for edge in edges for lane in _lanes(edge, vehicle_class, is_left_hand=is_left_hand)}
     vias = _vias(edges)
-    junctions = {node.getID(): _junction(node, vias, vehicle_class) for node in net.getNodes()}
+    walking = _walking_areas(net)
+    junctions = {node.getID(): _junction(node, vias, walking[node.getID()], vehicle_class) for node in net.getNodes()}
     return NetContents(
         lanes=lanes,
         edges={edge.getID(): tuple(_lane_ids(edge)) for edge in edges if not edge.getFunction()},
@@ -149,7 +151,16 @@ def _vias(edges: Iterable[Any]) -> dict[str, str]:
     }
 
 
-def _junction(node: Any, vias: dict[str, str], vehicle_class: str) -> Junction:
+def _walking_areas(net: Any) -> dict[str, list[Any]]:
+    """Their outlines, by junction: their edges are called ":junction_wN"."""
+    found: dict[str, list[Any]] = defaultdict(list)
+    for edge in net.getEdges():
+        if edge.getFunction() == "walkingarea":
+            found[edge.getID()[1:].rpartition("_w")[0]].append(edge.getLane(0).getShape())
+    return found
+
+
+def _junction(node: Any, vias: dict[str, str], walking: list[Any], vehicle_class: str) -> Junction:
     crossings = (edge for edge in node.getIncoming() if edge.getFunction() == "crossing")
     return Junction(
         id=node.getID(),
@@ -159,6 +170,8 @@ def _junction(node: Any, vias: dict[str, str], vehicle_class: str) -> Junction:
         foes=dict(node._foes),  # noqa: SLF001 no accessor
         responses=dict(node._prohibits),  # noqa: SLF001 no accessor
         crossings=tuple(lane_id for edge in crossings for lane_id in _lane_ids(edge)),
+        outline=tuple((x, y) for x, y, *_ in node.getShape()),
+        walking=tuple(tuple((x, y) for x, y, *_ in shape) for shape in walking),
     )
 
 

@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.polyline import Floats, Polyline
+from dvca_sumo.roadmap.areas import area_of, widened
 from dvca_sumo.roadmap.bounds import Bounds, bounds, lane_change
 from dvca_sumo.roadmap.drawing import Change, Drawing, Stretch
 from dvca_sumo.roadmap.lane_sequence import Leg, change_length, lane_sequence
@@ -62,6 +63,9 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
         for passage in plan.passages
         if begin <= passage.begin < end
     ]
+    road_left, road_right = (
+        _on_junctions(net, line, passages, edges) for edges in (edges_of.road_left, edges_of.road_right)
+    )
     changes = [change for change in _changes(plan, line, along) if change.latest > change.begin]
     crossed = tuple(crossing for p in passages for crossing in crossings(net, p.movement, line, p.begin, p.end))
     departure, destination = moved(plan.start), moved(plan.destination)
@@ -77,8 +81,8 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
         curvatures=line.curvatures,
         lane_left=edges_of.lane_left,
         lane_right=edges_of.lane_right,
-        road_left=edges_of.road_left,
-        road_right=edges_of.road_right,
+        road_left=road_left,
+        road_right=road_right,
         start=departure,
         destination=destination,
         stop_lines=tuple(stop_line(net, p.movement, p.begin, p.end) for p in passages),
@@ -184,6 +188,17 @@ def _steerable(net: NetContents, plan: _Plan, points: Floats, along: Floats, beg
 def _bounds(net: NetContents, plan: _Plan, line: Polyline, along: Floats) -> Bounds:
     """The edges along a line whose points lie `along` the rough one [m]."""
     return bounds(net.lanes, line, list(runs(_followed(plan, along))), _changes(plan, line, along))
+
+
+def _on_junctions(net: NetContents, line: Polyline, passages: Sequence[_Passage], edges: Floats) -> Floats:
+    """The road's edge on one side of `line`; on junctions their area counts."""
+    found = edges.copy()
+    for passage in passages:
+        first, last = np.searchsorted(line.stations, (passage.begin, passage.end))
+        rows, junction = slice(int(first), int(last)), net.junctions[passage.movement.junction]
+        area = area_of(junction.outline, junction.walking)
+        found[rows] = widened(edges[rows], line.points[rows], line.headings[rows], area)
+    return _fixed(found)
 
 
 def _changes(plan: _Plan, line: Polyline, along: Floats) -> list[Change]:

@@ -158,3 +158,28 @@ def test_overlapping_lanes_make_no_step_back(plain: NetBuilder) -> None:
     check_sound(route)
     assert np.abs(route.line.headings).max() < 0.1
     assert np.diff(route.line.points[:, 0]).min() > 0.9
+
+
+def test_on_a_junction_the_road_is_as_wide_as_its_area_allows(grid: NetBuilder) -> None:
+    roadmap = grid("--default.lanenumber=2", "--no-turnarounds")
+    route = roadmap.route(["A0B0", "B0B1"], "A0B0_1", 5.0, None, 100.0)
+    line = route.stop_lines[0]
+    middle = int(0.5 * (line.station + line.exit_station))
+    before = int(line.station) - 5
+    assert (route.road_left[before], route.road_right[before]) == pytest.approx((1.6, -4.8), abs=0.01)
+    assert route.road_left[middle] > route.lane_left[middle] + 1.0  # the middle of the junction
+    assert route.road_right[middle] < route.lane_right[middle] - 1.0
+    inside = slice(int(line.station) + 1, int(line.exit_station))
+    assert (route.road_left[inside] <= route.lane_left[inside] + 2.01).all()
+
+
+def test_corners_for_people_are_no_part_of_the_road(grid: NetBuilder) -> None:
+    """A right turn close round the kerb."""
+    ways = ["A1B1", "B1B0"]
+    with_people = grid("--sidewalks.guess", "--sidewalks.guess.max-speed=30", "--crossings.guess")
+    lane = next(name for name in ("A1B1_1", "A1B1_0") if with_people.lanes[name].is_drivable)
+    route = with_people.route(ways, lane, 5.0, None, 80.0)
+    line = route.stop_lines[0]
+    middle = int(0.5 * (line.station + line.exit_station))
+    kerb = route.road_right[middle]
+    assert kerb > -4.0
