@@ -77,24 +77,20 @@ class Meetings:
             return None
         stop = self._stop(row, graph, views if others_first else [])
         room = stop.at + stop.give
-        if not self._helps(room, row, graph, profile):
+        if room <= -_HARD_GAP - self._beside(row, graph, profile):  # stopping there would not help
             return None
         is_too_late = profile.speeds[0] ** 2 / (2.0 * max(room, _LEAST_ROOM)) > config.hard_braking
         if is_too_late and self._passes([row], graph, profile, 0.0)[0]:
             return None
         return Demand(row, stop, follows=self._joins(row, graph))
 
-    def _helps(self, room: float, row: int, graph: Graph, profile: Profile) -> bool:
-        """Whether to stop with so much `room` [m] before the other's way keeps the ego out of it."""
-        if room > -_HARD_GAP:
-            return True
-        if profile.speeds[0] >= _CREEPING:
-            return False
-        if graph.scene.classes[graph.scene.owners[row]] == _PERSON:
-            brushes = bool((graph.gaps[row][graph.occupied[row]] < _BRUSHING).any())
-            return room > -_HARD_GAP - (self._shape.length if brushes else _BESIDE_PERSON)
-        # Who passes close before the nose does not touch it; an ego that went on would touch them.
-        return self._shape.front < graph.contact(row, 0.0) < float(graph.path.arcs[-1])
+    def _beside(self, row: int, graph: Graph, profile: Profile) -> float:
+        """How far behind the front bumper somebody may come to the ego's way, and standing still helps [m]."""
+        is_person = graph.scene.classes[graph.scene.owners[row]] == _PERSON
+        if not is_person or profile.speeds[0] >= _CREEPING:
+            return 0.0
+        brushes = bool((graph.gaps[row][graph.occupied[row]] < _BRUSHING).any())
+        return self._shape.length if brushes else _BESIDE_PERSON
 
     def _will_wait(self, row: int, entry: float, graph: Graph) -> bool:
         """Whether who has to give way, and is on the path at `entry` [s], may still stop: unless it speeds up."""
@@ -163,7 +159,8 @@ class Meetings:
         """Before the other's way until it is clear; at the stop line of one of `views` that the ego has not crossed."""
         config, front = self._config, self._shape.front
         first, last, scene = graph.first[row], graph.last[row], graph.scene
-        gap = config.person_gap if scene.classes[scene.owners[row]] == _PERSON else config.yield_gap
+        is_person = scene.classes[scene.owners[row]] == _PERSON
+        gap = config.person_gap if is_person else config.yield_gap
         if self._joins(row, graph):
             nearest, until = float(graph.low[row, first]), float(scene.times[first])
         else:
@@ -173,6 +170,9 @@ class Meetings:
                 until = math.inf
         if nearest - _HARD_GAP <= front:  # its near end comes by; what gets into the way may do so further on
             nearest = graph.contact(row, float(graph.margins[row]))
+            if nearest <= front and not is_person:  # it passes close beside the ego, then may touch it further on
+                touch = graph.contact(row, 0.0)
+                nearest = touch if touch < graph.path.arcs[-1] else nearest
         at = nearest - gap - front
         for line, distance, _, _ in views:
             is_within = distance - 1.0 <= nearest - front <= distance + line.exit_station - line.station

@@ -38,6 +38,7 @@ class Graph(msgspec.Struct, frozen=True, eq=False):
     high: Floats  # (h, t) [m] its far end
     first: list[int]  # (h,) column in which occupation begins; 0 where there is none
     last: list[int]  # (h,) column in which it ends
+    rear_overhang: float  # [m] of the ego
 
     def track(self, row: int) -> int:
         """Id of the object whose future row `row` is."""
@@ -47,16 +48,15 @@ class Graph(msgspec.Struct, frozen=True, eq=False):
     def contact(self, row: int, margin: float) -> float:
         """The first arc at which who moves, as future `row` has it, is within `margin` [m] of the body's way.
 
-        It is the path's last arc where that is nowhere.
-
-        That may lie beyond the near end of what passes aslant beside the ego, and draws near only further on.
+        That may lie beyond the near end of what passes aslant beside the ego, and draws near only further on. It is 0
+        for all that is beside the ego's rear; the path's last arc where that is nowhere.
         """
         scene, columns = self.scene, self.occupied[row].nonzero()[0]
         boxes = np.tile(scene.boxes[scene.owners[row]], (len(columns), 1))
         boxes[:, :3] = scene.poses[row, columns]
         stations, gaps = _closely(boxes, self.window, self.path)
         count = len(self.path.arcs)
-        nearest = stations[gaps < margin].min(initial=count)
+        nearest = stations[(gaps < margin) & (stations > -self.rear_overhang)].min(initial=count)
         return float(np.interp(nearest, np.arange(count), self.path.arcs))
 
 
@@ -91,7 +91,7 @@ def graph_of(
         occupied[scene.moving :][_has_lane_room(scene, window, shape)] = False
     last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)
     first = occupied.argmax(axis=1).tolist()
-    return Graph(window, path, scene, occupied, margins, gaps, low, high, first, last.tolist())
+    return Graph(window, path, scene, occupied, margins, gaps, low, high, first, last.tolist(), shape.rear_overhang)
 
 
 def _look_closely(gaps: Floats, scene: Scene, window: Window, path: Path) -> None:

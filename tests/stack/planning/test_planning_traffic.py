@@ -194,6 +194,22 @@ def test_ego_that_stands_in_a_left_turn_stays_there_while_a_bus_passes_close_bef
     assert driven.states[-1, 2] > 40.0
 
 
+@pytest.mark.parametrize(
+    ("radius", "speed", "oncoming", "distance"),
+    [(14.0, 3.0, 10.0, 60.0), (20.0, 6.0, 14.0, 45.0), (26.0, 6.0, 10.0, 60.0)],
+)
+def test_ego_in_a_left_turn_stops_before_the_way_of_a_bus_that_first_comes_past_close_beside_it(
+    radius: float, speed: float, oncoming: float, distance: float
+) -> None:
+    junction = stop_line(96.0, Control.YIELD, exit_station=140.0)
+    y = 3.0 + distance * math.sin(0.1)
+    bus = car(3, 100.0 + distance, y, heading=math.pi + 0.1, speed=oncoming, size=(12.0, 2.5), lanes=("major_0",))
+    route = road(curve_points(radius), stop_lines=[junction])
+    driven = drive(route, 20.0, station=100.0, speed=speed, actors=[bus])
+    assert driven.clearances.min() > 0.4
+    assert driven.states[-1, 2] > 40.0
+
+
 def test_who_drives_along_on_the_inner_lane_of_a_roundabout_is_no_reason_to_slow_down() -> None:
     """Its box, at an angle to the ego's line, is wider across it than it is anywhere beside the ego."""
     bends = [0.0, 0.0, 0.0, -0.005, -0.017, -0.031, -0.048, -0.074, -0.096, -0.068, -0.033, -0.01, 0.013, 0.042, 0.071]
