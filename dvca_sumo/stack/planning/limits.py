@@ -10,6 +10,7 @@ from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.reference import BEHIND
+from dvca_sumo.stack.planning.scene import ALONG
 from dvca_sumo.stack.planning.speed import Leader, Stop, slowed_before
 from dvca_sumo.stack.planning.st_graph import Graph
 
@@ -17,6 +18,8 @@ _PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
 _PRIORITY = Control.PRIORITY
 _SLOW_FOR_PERSON = (3.0, 6.0)  # [m/s], [m/s per m of gap]
 _SLOW_FOR_OBJECT = (4.0, 10.0)  # [m/s], [m/s per m of gap]
+_BESIDE = 3.0  # [m] sideways
+_AT_LINE = 4.0  # [m] before or past it
 _SLOW_MOVER = 3.0  # [m/s] faster ones are not passed slowly
 _GIVE_AT_DESTINATION = 1.0  # [m]
 _GIVE_AT_OBJECT = 1.0  # [m] of the distance to it is never spent
@@ -27,7 +30,7 @@ _SOON_STEP = 15  # of the profile: 3 s
 def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config: PlanningConfig) -> list[float]:
     """Highest speed by metre of path [m/s]: limit, curves, passing close by, lines where others may come first.
 
-    Each is braked for in comfort beforehand.
+    Each is braked for in comfort beforehand. Past such a line the ego feels its way until it sees by who waits beside.
     """
     path = graph.path
     caps = np.minimum(
@@ -40,11 +43,29 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
             part = slice(max(int(low), 0), int(high) + 1)
             caps[part] = np.minimum(caps[part], cap)
     for line, distance, _, goes_first in views:
-        if goes_first and distance > 0.0 and line.control is not _PRIORITY:
+        if not goes_first or line.control is _PRIORITY:
+            continue
+        if distance > 0.0:
             part = slice(int(distance), int(distance) + 2)
             caps[part] = np.minimum(caps[part], config.give_way_speed)
+        abreast = _hiding(graph, shape.front + distance) - shape.front
+        if abreast > 0.0:
+            part = slice(max(int(min(distance, abreast)), 0), int(abreast) + 1)
+            caps[part] = np.minimum(caps[part], config.peering_speed)
     slowed: list[float] = slowed_before(caps, path.arcs, config.slowing).tolist()
     return slowed
+
+
+def _hiding(graph: Graph, line: float) -> float:
+    """The foremost nose of those who wait beside the ego's way at a `line` [m along the path], and hide what comes.
+
+    Minus infinity where nobody does.
+    """
+    scene, still = graph.scene, slice(graph.scene.moving, None)
+    gaps, noses = graph.gaps[still, 0], graph.high[still, 0]
+    waits = (gaps > 0.0) & (gaps < _BESIDE) & (np.abs(noses - line) < _AT_LINE)
+    waits &= (scene.futures.directions[still, 0] > ALONG) & (scene.classes[scene.owners[still]] == _VEHICLE)
+    return float(noses[waits].max(initial=-math.inf))
 
 
 def nearest_stop(

@@ -252,6 +252,26 @@ def test_stream_with_priority_is_waited_for_at_the_line() -> None:
     assert driven.fronts[-1] > 150.0
 
 
+@pytest.mark.parametrize(
+    ("control", "nose", "slowest"),
+    [
+        (Control.YIELD, 99.0, (1.0, 2.6)),
+        (Control.YIELD, 102.0, (1.0, 2.3)),
+        (Control.YIELD, 92.0, (7.0, 9.0)),
+        (Control.PRIORITY, 99.0, (12.0, 14.0)),
+    ],
+)
+def test_past_who_waits_beside_at_a_line_the_ego_feels_its_way(
+    control: Control, nose: float, slowest: tuple[float, float]
+) -> None:
+    """What comes may be hidden behind that one."""
+    beside = car(3, nose - 2.25, 3.2)
+    driven = drive(road(lanes_left=1, stop_lines=[stop_line(100.0, control)]), 20.0, speed=13.0, actors=[beside])
+    at_line = (driven.fronts > min(nose, 99.5) - 0.5) & (driven.fronts < max(nose, 100.5))
+    assert slowest[0] < driven.speeds[at_line].min() < slowest[1]
+    assert driven.fronts[-1] > 130.0
+
+
 @pytest.mark.parametrize("x", [99.3, 106.0])
 def test_car_that_has_to_wait_is_passed(x: float) -> None:
     """Also where a part of it is on this side of the ego's stop line."""
