@@ -20,6 +20,7 @@ _SLOW_FOR_PERSON = (3.0, 6.0)  # [m/s], [m/s per m of gap]
 _SLOW_FOR_OBJECT = (4.0, 10.0)  # [m/s], [m/s per m of gap]
 _BESIDE = 3.0  # [m] sideways
 _AT_LINE = 4.0  # [m] before or past it
+_SLOWED = 4.0  # [m/s]
 _SLOW_MOVER = 3.0  # [m/s] faster ones are not passed slowly
 _GIVE_AT_DESTINATION = 1.0  # [m]
 _GIVE_AT_OBJECT = 1.0  # [m] of the distance to it is never spent
@@ -57,14 +58,14 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
 
 
 def _hiding(graph: Graph, line: float) -> float:
-    """The foremost nose of those who wait beside the ego's way at a `line` [m along the path], and hide what comes.
+    """The foremost nose of those who wait, or slow down, beside the ego's way at a `line` [m along the path].
 
-    Minus infinity where nobody does.
+    They hide what comes, and may have seen it. Minus infinity where nobody does.
     """
-    scene, still = graph.scene, slice(graph.scene.moving, None)
-    gaps, noses = graph.gaps[still, 0], graph.high[still, 0]
+    scene, gaps, noses = graph.scene, graph.gaps[:, 0], graph.high[:, 0]
     waits = (gaps > 0.0) & (gaps < _BESIDE) & (np.abs(noses - line) < _AT_LINE)
-    waits &= (scene.futures.directions[still, 0] > ALONG) & (scene.classes[scene.owners[still]] == _VEHICLE)
+    waits &= (scene.futures.directions[:, 0] > ALONG) & (scene.classes[scene.owners] == _VEHICLE)
+    waits &= scene.speeds[scene.owners] < _SLOWED
     return float(noses[waits].max(initial=-math.inf))
 
 

@@ -264,8 +264,8 @@ def test_stream_with_priority_is_waited_for_at_the_line() -> None:
 def test_past_who_waits_beside_at_a_line_the_ego_feels_its_way(
     control: Control, nose: float, slowest: tuple[float, float]
 ) -> None:
-    """What comes may be hidden behind that one."""
-    beside = car(3, nose - 2.25, 3.2)
+    """What comes may be hidden behind that one, who has hardly come to stand when the ego is there."""
+    beside = car(3, nose - 2.25 - 6.0, 3.2, speed=2.0, stays_from=3.0)
     driven = drive(road(lanes_left=1, stop_lines=[stop_line(100.0, control)]), 20.0, speed=13.0, actors=[beside])
     at_line = (driven.fronts > min(nose, 99.5) - 0.5) & (driven.fronts < max(nose, 100.5))
     assert slowest[0] < driven.speeds[at_line].min() < slowest[1]
