@@ -121,6 +121,13 @@ class LanePaths:
         poses[:, :, _Y] += offsets * np.cos(poses[:, :, _HEADING])
         return poses
 
+    def bodies(self, paths: Sequence[LanePath], stations: Floats, offsets: Floats, lengths: Floats) -> Floats:
+        """As `poses`, of the middles of bodies so long (h,) that both ends follow the path: chords in its bends."""
+        half = 0.5 * lengths[:, None]
+        fronts, rears = (self.poses(paths, stations + end, offsets)[:, :, :_HEADING] for end in (half, -half))
+        ways = fronts - rears
+        return np.concatenate((0.5 * (fronts + rears), np.arctan2(ways[:, :, _Y], ways[:, :, _X])[:, :, None]), axis=2)
+
     def _continuations(self, lane: str, length: float) -> list[tuple[float, tuple[str, ...]]]:
         """Best-first search: the first ones to reach `length` are the likeliest."""
         lanes = self._lanes

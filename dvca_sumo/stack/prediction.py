@@ -16,8 +16,9 @@ from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.lane_changes import LaneChangeConfig, LaneChanges, lateral_speeds
 from dvca_sumo.stack.lane_following import Candidates, LaneFollowing, LaneMatchConfig, Movers
 from dvca_sumo.stack.lane_motion import LaneMotion, MotionModelConfig
-from dvca_sumo.stack.lane_paths import LanePaths
+from dvca_sumo.stack.lane_paths import LanePath, LanePaths
 
+_LONG = 7.0  # [m] longer bodies (buses, lorries) cut the corners of their lanes noticeably
 # Comparing an array with an enumeration's member costs numpy ten times as much as with a number.
 _VEHICLE, _BICYCLE, _PERSON = int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 
@@ -131,14 +132,30 @@ class MapPrediction:
         stations = self._motion.travelled(paths, places.stations, own, trends[owners], float(reaches[owners].max()))
         is_bicycle = tracked.classes[owners] == _BICYCLE
         keeps_side = is_bicycle & (np.abs(places.offsets) <= places.half_widths)
-        targets = np.where(keeps_side, places.offsets, 0.0)
-        offsets, slants = self._motion.settled(places.offsets, targets, drifts, own)
+        lengths = tracked.boxes[owners, 3]
+        long = (lengths > _LONG).nonzero()[0]
+        long_paths, beside = [paths[row] for row in long.tolist()], places.offsets
+        if long_paths:
+            beside = beside.copy()
+            beside[long] -= self._cut(long_paths, places.stations[long], lengths[long])
+        targets = np.where(keeps_side, beside, 0.0)
+        offsets, slants = self._motion.settled(beside, targets, drifts, own)
         poses = self._paths.poses(paths, stations, offsets)
+        if long_paths:
+            poses[long] = self._paths.bodies(long_paths, stations[long], offsets[long], lengths[long])
         poses[:, :, 2] = wrapped_all(poses[:, :, 2] + slants)
         poses[:, 0] = tracked.boxes[owners, :3]
         ends = zip(paths, stations[:, 0].tolist(), stations[:, -1].tolist(), strict=True)
         lanes = [path.lanes_between(start, end) for path, start, end in ends]
         return _told_apart(owners, probabilities, poses, lanes)
+
+    def _cut(self, paths: list[LanePath], stations: Floats, lengths: Floats) -> Floats:
+        """How far to the left of its path the middle of a long body is where its ends are on it (h,) [m]."""
+        here, none = stations[:, None], np.zeros((len(stations), 1))
+        on_path = self._paths.poses(paths, here, none)[:, 0]
+        gaps = self._paths.bodies(paths, here, none, lengths)[:, 0] - on_path
+        cut: Floats = gaps[:, 1] * np.cos(on_path[:, 2]) - gaps[:, 0] * np.sin(on_path[:, 2])
+        return cut
 
     def _straight_on(self, tracked: TrackedObjects, rows: Integers, speeds: Floats) -> Floats:
         """Constant velocity (n, t, 3), which is none for a standing vehicle or obstacle."""

@@ -59,6 +59,7 @@ class Seen(NamedTuple):
     kind: ObjectClass = ObjectClass.VEHICLE
     drift: float = 0.0  # [m/s] to its left
     track: int = 1
+    length: float = 4.5  # [m]
 
 
 def tracked(time: float, *seen: Seen) -> TrackedObjects:
@@ -73,7 +74,7 @@ def tracked(time: float, *seen: Seen) -> TrackedObjects:
         time=time,
         ids=np.array([s.track for s in seen], dtype=np.int64),
         classes=np.array([s.kind for s in seen], dtype=np.int64),
-        boxes=np.array([(s.x, s.y, s.heading, 4.5, 1.8) for s in seen]).reshape(-1, 5),
+        boxes=np.array([(s.x, s.y, s.heading, s.length, 1.8) for s in seen]).reshape(-1, 5),
         velocities=np.array(velocities).reshape(-1, 2),
         signals={},
     )
@@ -109,6 +110,19 @@ def test_a_vehicle_in_a_bend_stays_on_its_lane(roadmap: RoadMap) -> None:
     assert result.poses[0, 0] == pytest.approx([x, y, heading])
     assert result.poses[0, -1, 2] == pytest.approx(math.pi / 2, abs=0.05)
     assert result.lanes == (("bend_0",),)
+
+
+def test_both_ends_of_a_bus_follow_its_lane_and_its_middle_cuts_the_bend(roadmap: RoadMap) -> None:
+    front, rear = (np.array(lane_point(roadmap, "bend_0", 200.0 + end)[:2]) for end in (6.0, -6.0))
+    (x, y), (east, north) = 0.5 * (front + rear), front - rear
+    result = predicted(roadmap, Seen(x, y, math.atan2(north, east), length=12.0))
+    poses = result.poses[0]
+    ways = 6.0 * np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=1)
+    line = roadmap.lanes["bend_0"].line
+    for end in (poses[:, :2] + ways, poses[:, :2] - ways):
+        assert np.abs(line.project(end)[1]).max() < 0.1
+    _, cuts = line.project(poses[:3, :2])
+    assert cuts == pytest.approx(12.0**2 / (8.0 * RADIUS), abs=0.1)
 
 
 def test_at_a_fork_every_way_is_a_hypothesis_and_straight_on_the_likeliest(roadmap: RoadMap) -> None:
