@@ -20,6 +20,7 @@ from dvca_sumo.stack.planning.speed import Stop
 
 ARRIVED = 0.4  # [m] from the lane's centre
 _OVER = 0.2  # [m] of the body over the marking, from which on going on is safer than going back
+_OVERLAP = 1.0  # [m] lengthwise, of who is abreast
 _WAITING = "wait to change lanes"
 _NEAR_END = 3.0  # [m] before the place where it has to
 
@@ -83,7 +84,8 @@ class LaneChanger:
             if not self._gaps.is_free(occupied[target + 1], change, window, speed, is_pressed=is_pressed):
                 break
             target += 1
-        if target < self._target and is_over(aside, change.widths[self._lane], self._shape):
+        width, beside = change.widths[self._lane], occupied[self._lane + 1]
+        if target < self._target and goes_on(aside, width, beside, self._shape):
             target = self._target
         self._target = target
         behind = letting_in(occupied[self._lane + 1 : target + 1], self._shape)
@@ -122,9 +124,14 @@ def last_stop(
     return Stop(at, 0.5 * way, _WAITING)
 
 
-def is_over(aside: float, width: float, shape: VehicleShape) -> bool:
-    """Whether an ego `aside` of the centre of its lane [m] is that far over the marking that it should go on."""
-    return abs(aside) - 0.5 * (width - shape.width) > _OVER
+def goes_on(aside: float, width: float, lane: Neighbours, shape: VehicleShape) -> bool:
+    """Whether an ego `aside` of the centre of its lane [m] finishes the change to `lane` that it has begun.
+
+    It does once it is over the marking, unless somebody has come abreast of it there, and once half of it is over.
+    """
+    over = abs(aside) - 0.5 * (width - shape.width)
+    is_abreast = (lane.rears < shape.front - _OVERLAP) & (lane.fronts > _OVERLAP - shape.rear_overhang)
+    return over > 0.5 * shape.width or (over > _OVER and not is_abreast.any())
 
 
 def is_last_chance(stop: Stop, speed: float) -> bool:

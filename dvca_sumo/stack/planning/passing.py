@@ -14,8 +14,8 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.lane_changing import (
     ARRIVED,
     LaneChoice,
+    goes_on,
     is_last_chance,
-    is_over,
     keeping,
     last_stop,
     letting_in,
@@ -71,8 +71,8 @@ class Passing:
         wish = target = self._wish(beside, own, is_late=is_late, is_queue=is_queue)
         if target != self._lane:
             is_pressed = self._lane != self._target or is_last_chance(stop, speed)
-            goes_on = is_over(float(aside[self._lane]), way.widths[self._lane], shape)
-            if not goes_on and not self._gaps.is_free(occupied[target], way, window, speed, is_pressed=is_pressed):
+            is_begun = goes_on(float(aside[self._lane]), way.widths[self._lane], occupied[target], shape)
+            if not is_begun and not self._gaps.is_free(occupied[target], way, window, speed, is_pressed=is_pressed):
                 target = self._lane
         pace = math.inf
         if target != wish and (is_late or is_queue):

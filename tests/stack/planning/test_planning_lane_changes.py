@@ -3,11 +3,13 @@
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import SHAPE, Drive, assert_drivable, car, drive, road, stop_line
+from planned_drives import SHAPE, Drive, assert_drivable, believed, car, drive, predicted, road, stop_line
 
-from dvca_sumo.messages import Floats
+from dvca_sumo.geometry.boxes import box_of, distances
+from dvca_sumo.messages import Floats, LocalizationEstimate
 from dvca_sumo.roadmap import Control, Route
 from dvca_sumo.roadmap.route import LaneChange
+from dvca_sumo.stack.planning import Planner, PlanningConfig
 
 WIDTH = 3.2  # [m] of a lane
 START, LATEST = 100.0, 400.0  # [m]
@@ -114,6 +116,25 @@ def test_one_that_pulls_into_the_gap_in_time_is_let_in() -> None:
     driven = drive(crossing_over(), 40.0, speed=13.0, station=start - 20.0, actors=[merging])
     assert driven.clearances.min() > 1.0
     assert lane_at(driven, LATEST) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("ahead", [-2.0, 0.0, 2.0])
+def test_a_change_is_broken_off_where_somebody_comes_abreast_in_the_next_lane(ahead: float) -> None:
+    """Two who change to one lane from both sides; the other was no neighbour of that lane before."""
+    planner = Planner(PlanningConfig(), crossing_over(), SHAPE)
+    estimate, gaps, other = believed(95.0, speed=8.0), [], None
+    for index in range(80):
+        time = 0.1 * index
+        if other is None and estimate.y > 1.0:  # a part of the body is over the marking
+            other = car(7, estimate.x + 1.4 + ahead - 8.0 * time, estimate.y + 3.0, speed=8.0)
+        actors = [] if other is None else [other]
+        points = planner.step(estimate, predicted(actors, time), {}).points
+        if other is not None:
+            ego = box_of(estimate.x, estimate.y, estimate.heading, SHAPE)
+            gaps.append(float(distances(ego, np.array([other.box_at(time)]))[0]))
+        _, x, y, heading, speed, acceleration, curvature = points[1].tolist()
+        estimate = LocalizationEstimate(0.1 * (index + 1), x, y, heading, speed, acceleration, speed * curvature)
+    assert min(gaps) > 0.3
 
 
 @pytest.mark.parametrize("speed", [3.0, 4.0])
