@@ -9,7 +9,7 @@ from dvca_sumo.geometry.polyline import Floats
 
 _FARTHEST = 1.5  # [m] beyond the edge of the road beside its lane, up to which a junction's area is an ego's to use
 
-Shape = Sequence[Sequence[float]]
+Shape = Sequence[tuple[float, float]]
 
 
 def area_of(outline: Shape, walking: Iterable[Shape]) -> shapely.Geometry:
@@ -39,4 +39,4 @@ def widened(edges: Floats, points: Floats, headings: Floats, area: shapely.Geome
 def _polygon(shape: Shape) -> shapely.Geometry:
     if len(shape) < 3:
         return shapely.Polygon()
-    return shapely.make_valid(shapely.Polygon([point[:2] for point in shape]))
+    return shapely.buffer(shapely.Polygon(shape), 0.0)  # an outline that crosses itself becomes one that does not

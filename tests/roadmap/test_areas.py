@@ -1,0 +1,40 @@
+"""How far a road reaches on a junction."""
+
+import numpy as np
+import pytest
+
+from dvca_sumo.geometry.polyline import Floats
+from dvca_sumo.roadmap.areas import area_of, widened
+
+SQUARE = [(0.0, -3.0), (10.0, -3.0), (10.0, 20.0), (0.0, 20.0)]
+POINTS = np.array([[-1.0, 0.0], [1.0, 0.0], [5.0, 0.0], [9.0, 0.0], [11.0, 0.0]])  # a line east, two of them outside
+
+
+def edges(side: float, outline: list[tuple[float, float]], *walking: list[tuple[float, float]]) -> Floats:
+    """Of a lane 3.2 m wide, and half a metre."""
+    return widened(np.full(5, 2.1 * side), POINTS, np.zeros(5), area_of(outline, walking))
+
+
+def test_the_edge_is_where_the_area_ends_or_as_far_out_as_is_of_use() -> None:
+    assert edges(1.0, SQUARE) == pytest.approx([2.1, 3.6, 3.6, 3.6, 2.1])
+    assert edges(-1.0, SQUARE) == pytest.approx([-2.1, -3.0, -3.0, -3.0, -2.1])
+
+
+def test_what_is_for_people_is_left_to_them() -> None:
+    corner = [(4.0, -3.0), (10.0, -3.0), (10.0, -2.5), (4.0, -2.5)]
+    assert edges(-1.0, SQUARE, corner) == pytest.approx([-2.1, -3.0, -2.5, -2.5, -2.1])
+
+
+@pytest.mark.parametrize(
+    "outline",
+    [[], [(0.0, 0.0)], [(0.0, 0.0), (10.0, 0.0)], [(0.0, 0.0), (10.0, 0.0), (5.0, 0.0)], [*SQUARE[:2], SQUARE[0]]],
+)
+def test_a_junction_drawn_without_an_area_changes_nothing(outline: list[tuple[float, float]]) -> None:
+    assert edges(1.0, outline) == pytest.approx([2.1] * 5)
+
+
+def test_an_outline_that_crosses_itself_is_an_area_too() -> None:
+    crossed = [(0.0, -3.0), (10.0, 20.0), (10.0, -3.0), (0.0, 20.0)]
+    found = edges(1.0, crossed)
+    assert np.isfinite(found).all()
+    assert (found >= 2.1).all()
