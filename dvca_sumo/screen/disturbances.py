@@ -3,9 +3,8 @@
 The rule: a body appears within sight without having come there (it was inserted, or teleported), or one of its ends
 moves farther in one step than its speed allows (a jump; SUMO's lane changes are such jumps, and so are its turns on the
 spot), and at that moment it touches the ego, or it is so close in the ego's way that full braking after a reaction
-would not keep the ego off it. Or a person walks into an ego that has stood for a second: SUMO's people see vehicles on
-crossings from afar, and walk through those that stand. For a while after, violations with that body are the simulator's
-doing.
+would not keep the ego off it. Or a person walks into an ego that has stood for a second: SUMO's people walk through
+vehicles. For a while after, violations with that body are the simulator's doing.
 """
 
 import math
