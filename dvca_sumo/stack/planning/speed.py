@@ -29,6 +29,7 @@ _HOLD = -1.0  # [m/s^2]
 _FIRMER = 1.1  # than the constant braking that would just do
 _SAFE_GAP = 2.0  # [m] to a leader, kept by braking beyond comfort if need be
 _TOUCH = 0.1  # [m] smallest distance divided by
+_ONCOMING = 2.0  # [s] later, the room is looked at that who comes towards the ego leaves
 _FAR = 200.0  # [m] beyond which there is no leader
 _HARDER = 1.3  # than the constant braking that would just match the leader's speed
 _GENTLE_CLOSING = 2.0  # [m/s^2] of braking to match a leader's speed, up to which comfort is enough
@@ -143,6 +144,8 @@ def _for_leader(gap: float, v: float, leader_speed: float, config: PlanningConfi
     """The intelligent driver model; harsher than comfort only where the gap would not last otherwise."""
     if gap > _FAR:
         return config.acceleration
+    if leader_speed < -_HOLD_SPEED:  # it comes towards the ego: what counts is the room there will be
+        gap += _ONCOMING * leader_speed
     closing = v - leader_speed
     if v < _HOLD_SPEED and leader_speed < _HOLD_SPEED and gap < config.follow_gap + _HOLD_GAP:
         return _HOLD

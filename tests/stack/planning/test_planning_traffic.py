@@ -242,6 +242,15 @@ def test_ego_stops_at_once_for_a_car_that_comes_out_right_before_its_bumper(spee
     assert_drivable(driven)
 
 
+@pytest.mark.parametrize("speed", [5.0, 14.0])
+def test_a_standing_ego_does_not_start_towards_who_comes_past_it_with_hardly_room(speed: float) -> None:
+    driven = drive(
+        road(), 12.0, station=100.0, actors=[car(3, 106.0 + 2.5 * speed, 2.0, heading=-math.pi, speed=speed)]
+    )
+    assert driven.speeds[driven.states[:, 0] < 2.0].max() < 0.2
+    assert driven.fronts[-1] > 120.0
+
+
 def test_stream_with_priority_is_waited_for_at_the_line() -> None:
     stream = [car(k, 106.0, -60.0 - 25.0 * k, heading=UP, speed=10.0, lanes=("major_0",)) for k in range(8)]
     driven = drive(road(stop_lines=[stop_line(100.0, Control.YIELD)]), 40.0, speed=13.0, actors=stream)
