@@ -63,9 +63,7 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
         for passage in plan.passages
         if begin <= passage.begin < end
     ]
-    road_left, road_right = (
-        _on_junctions(net, line, passages, edges) for edges in (edges_of.road_left, edges_of.road_right)
-    )
+    road_left, road_right = _on_junctions(net, line, passages, edges_of)
     changes = [change for change in _changes(plan, line, along) if change.latest > change.begin]
     crossed = tuple(crossing for p in passages for crossing in crossings(net, p.movement, line, p.begin, p.end))
     departure, destination = moved(plan.start), moved(plan.destination)
@@ -190,15 +188,18 @@ def _bounds(net: NetContents, plan: _Plan, line: Polyline, along: Floats) -> Bou
     return bounds(net.lanes, line, list(runs(_followed(plan, along))), _changes(plan, line, along))
 
 
-def _on_junctions(net: NetContents, line: Polyline, passages: Sequence[_Passage], edges: Floats) -> Floats:
-    """The road's edge on one side of `line`; on junctions their area counts."""
-    found = edges.copy()
+def _on_junctions(
+    net: NetContents, line: Polyline, passages: Sequence[_Passage], edges_of: Bounds
+) -> tuple[Floats, Floats]:
+    """The road's edges to the left and to the right of `line`; on junctions their area counts."""
+    edges = edges_of.road_left.copy(), edges_of.road_right.copy()
     for passage in passages:
         first, last = np.searchsorted(line.stations, (passage.begin, passage.end))
         rows, junction = slice(int(first), int(last)), net.junctions[passage.movement.junction]
         area = area_of(junction.outline, junction.walking)
-        found[rows] = widened(edges[rows], line.points[rows], line.headings[rows], area)
-    return _fixed(found)
+        for edge in edges:
+            edge[rows] = widened(edge[rows], line.points[rows], line.headings[rows], area)
+    return _fixed(edges[0]), _fixed(edges[1])
 
 
 def _changes(plan: _Plan, line: Polyline, along: Floats) -> list[Change]:

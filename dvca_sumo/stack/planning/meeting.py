@@ -169,10 +169,9 @@ class Meetings:
             if last == len(scene.times) - 1:
                 until = math.inf
         if nearest - _HARD_GAP <= front:  # its near end comes by; what gets into the way may do so further on
-            nearest = graph.contact(row, float(graph.margins[row]))
-            if nearest <= front and not is_person:  # it passes close beside the ego, then may touch it further on
-                touch = graph.contact(row, 0.0)
-                nearest = touch if touch < graph.path.arcs[-1] else nearest
+            nearest, touching = graph.contacts(row)
+            if nearest <= front and not is_person and touching < graph.path.arcs[-1]:
+                nearest = touching  # it passes close beside the ego, then touches it further on
         at = nearest - gap - front
         for line, distance, _, _ in views:
             is_within = distance - 1.0 <= nearest - front <= distance + line.exit_station - line.station

@@ -45,19 +45,20 @@ class Graph(msgspec.Struct, frozen=True, eq=False):
         track: int = self.scene.ids[self.scene.owners[row]]
         return track
 
-    def contact(self, row: int, margin: float) -> float:
-        """The first arc at which who moves, as future `row` has it, is within `margin` [m] of the body's way.
+    def contacts(self, row: int) -> tuple[float, float]:
+        """The first arcs at which who moves, as future `row` has it, is within its margin of the body's way, and in it.
 
-        That may lie beyond the near end of what passes aslant beside the ego, and draws near only further on. It is 0
-        for all that is beside the ego's rear; the path's last arc where that is nowhere.
+        They may lie beyond the near end of what passes aslant beside the ego, and draws near only further on. They are
+        0 for all that is beside the ego's rear; the path's last arc where that is nowhere.
         """
         scene, columns = self.scene, self.occupied[row].nonzero()[0]
         boxes = np.tile(scene.boxes[scene.owners[row]], (len(columns), 1))
         boxes[:, :3] = scene.poses[row, columns]
         stations, gaps = _closely(boxes, self.window, self.path)
-        count = len(self.path.arcs)
-        nearest = stations[(gaps < margin) & (stations > -self.rear_overhang)].min(initial=count)
-        return float(np.interp(nearest, np.arange(count), self.path.arcs))
+        count, is_there = len(self.path.arcs), stations > -self.rear_overhang
+        nearest = [stations[(gaps < margin) & is_there].min(initial=count) for margin in (self.margins[row], 0.0)]
+        within, touching = np.interp(nearest, np.arange(count), self.path.arcs).tolist()
+        return within, touching
 
 
 def graph_of(
