@@ -14,9 +14,9 @@ Shape = Sequence[tuple[float, float]]
 
 def area_of(outline: Shape, walking: Iterable[Shape]) -> shapely.Geometry:
     """A junction within its `outline`, without the `walking` areas; empty where the net draws none."""
-    area = _polygon(outline)
+    area = polygon(outline)
     for corner in walking:
-        area = area.difference(_polygon(corner))
+        area = area.difference(polygon(corner))
     return area
 
 
@@ -36,7 +36,8 @@ def widened(edges: Floats, points: Floats, headings: Floats, area: shapely.Geome
     return found
 
 
-def _polygon(shape: Shape) -> shapely.Geometry:
+def polygon(shape: Shape) -> shapely.Geometry:
+    """The area within an outline; empty where that is none."""
     if len(shape) < 3:
         return shapely.Polygon()
     return shapely.buffer(shapely.Polygon(shape), 0.0)  # an outline that crosses itself becomes one that does not

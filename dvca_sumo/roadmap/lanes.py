@@ -27,6 +27,7 @@ class Lane(msgspec.Struct, frozen=True, eq=False, gc=False):
     is_motorway: bool
     is_internal: bool  # on a junction
     is_crossing: bool  # for pedestrians across the road
+    is_pavement: bool  # for pedestrians alone, beside or away from the road
     is_drivable: bool  # for the vehicle class the map was loaded for
     left: str | None
     right: str | None
@@ -65,7 +66,7 @@ class Junction(msgspec.Struct, frozen=True, eq=False):
     responses: dict[int, str]  # likewise; "1" where the other has priority
     crossings: tuple[str, ...]  # lane ids of pedestrian crossings
     outline: tuple[tuple[float, float], ...]  # [m] as drawn; () in a net that does not
-    walking: tuple[tuple[tuple[float, float], ...], ...]  # [m] outlines of the areas of it that are for people on foot
+    walking: dict[str, tuple[tuple[float, float], ...]]  # [m] by lane id: outlines of its areas for people on foot
 
     def conflicting(self, movement: Movement) -> frozenset[str]:
         """Lanes of all movements whose paths conflict with `movement`'s."""

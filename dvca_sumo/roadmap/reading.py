@@ -106,6 +106,7 @@ def _lanes(edge: Any, vehicle_class: str, *, is_left_hand: bool) -> Iterator[Lan
             is_motorway=(edge.getType() or "").startswith(_MOTORWAYS),
             is_internal=edge.getFunction() == "internal",
             is_crossing=edge.getFunction() == "crossing",
+            is_pavement=not edge.getFunction() and set(lane.getPermissions()) == {"pedestrian"},
             is_drivable=drivable[index],
             left=lower if is_left_hand else upper,
             right=upper if is_left_hand else lower,
@@ -151,16 +152,17 @@ def _vias(edges: Iterable[Any]) -> dict[str, str]:
     }
 
 
-def _walking_areas(net: Any) -> dict[str, list[Any]]:
+def _walking_areas(net: Any) -> dict[str, dict[str, Any]]:
     """Their outlines, by junction: their edges are called ":junction_wN"."""
-    found: dict[str, list[Any]] = defaultdict(list)
+    found: dict[str, dict[str, Any]] = defaultdict(dict)
     for edge in net.getEdges():
         if edge.getFunction() == "walkingarea":
-            found[edge.getID()[1:].rpartition("_w")[0]].append(edge.getLane(0).getShape())
+            lane = edge.getLane(0)
+            found[edge.getID()[1:].rpartition("_w")[0]][lane.getID()] = lane.getShape()
     return found
 
 
-def _junction(node: Any, vias: dict[str, str], walking: list[Any], vehicle_class: str) -> Junction:
+def _junction(node: Any, vias: dict[str, str], walking: dict[str, Any], vehicle_class: str) -> Junction:
     crossings = (edge for edge in node.getIncoming() if edge.getFunction() == "crossing")
     return Junction(
         id=node.getID(),
@@ -171,7 +173,7 @@ def _junction(node: Any, vias: dict[str, str], walking: list[Any], vehicle_class
         responses=dict(node._prohibits),  # noqa: SLF001 no accessor
         crossings=tuple(lane_id for edge in crossings for lane_id in _lane_ids(edge)),
         outline=tuple((x, y) for x, y, *_ in node.getShape()),
-        walking=tuple(tuple((x, y) for x, y, *_ in shape) for shape in walking),
+        walking={lane: tuple((x, y) for x, y, *_ in shape) for lane, shape in walking.items()},
     )
 
 

@@ -1,6 +1,7 @@
 """The map the ADS plans on."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 
@@ -14,6 +15,7 @@ from dvca_sumo.roadmap.levels import Levels
 from dvca_sumo.roadmap.reading import NetContents, read_net
 from dvca_sumo.roadmap.route import Route
 from dvca_sumo.roadmap.routing import route
+from dvca_sumo.roadmap.walkways import Walkways
 
 
 class RoadMap:
@@ -41,6 +43,11 @@ class RoadMap:
     def lanes(self) -> MappingProxyType[str, Lane]:
         """Every lane by id: normal and internal lanes, and pedestrian crossings."""
         return MappingProxyType(self._net.lanes)
+
+    @cached_property
+    def walkways(self) -> Walkways:
+        """Where people walk."""
+        return Walkways(self._net)
 
     def lanes_near(self, points: npt.ArrayLike, radius: float) -> list[tuple[str, ...]]:
         """For each of `points` (m, 2), the lanes with their centre line within `radius` [m], nearest first.

@@ -1,7 +1,7 @@
 """Prediction: tracked objects -> their possible futures over six seconds.
 
 Vehicles and bicycles follow the lane they are on, through every continuation it has, or change to the
-next lane when they are seen to drift there. Whatever is on no lane, and people, go on as they are.
+next lane when they are seen to drift there. People walk as `walking` has it. Whatever is on no lane goes on as it is.
 """
 
 import math
@@ -13,10 +13,12 @@ import numpy.typing as npt
 from dvca_sumo.geometry.angles import wrapped_all
 from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, PredictedObjects, TrackedObjects
 from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.stack.hypotheses import Hypotheses, message_of
 from dvca_sumo.stack.lane_changes import LaneChangeConfig, LaneChanges, lateral_speeds
 from dvca_sumo.stack.lane_following import Candidates, LaneFollowing, LaneMatchConfig, Movers
 from dvca_sumo.stack.lane_motion import LaneMotion, MotionModelConfig
 from dvca_sumo.stack.lane_paths import LanePath, LanePaths
+from dvca_sumo.stack.walking import Walking, WalkingConfig
 
 _LONG = 7.0  # [m] longer bodies (buses, lorries) cut the corners of their lanes noticeably
 # Comparing an array with an enumeration's member costs numpy ten times as much as with a number.
@@ -29,8 +31,9 @@ class PredictionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     matching: LaneMatchConfig = LaneMatchConfig()
     changes: LaneChangeConfig = LaneChangeConfig()
     motion: MotionModelConfig = MotionModelConfig()
+    walking: WalkingConfig = WalkingConfig()
     max_branches: int = 3  # continuations of a lane
-    standing_speed: float = 0.3  # [m/s] slower vehicles stay where they are
+    standing_speed: float = 0.3  # [m/s] slower vehicles stay where they are, slower people go on as they are
     direction_speed: float = 2.0  # [m/s] faster objects go where their velocity points, slower ones their box
     trend_smoothing: float = 0.5  # [s] time constant of acceleration estimates
     max_trend: float = 2.5  # [m/s^2] acceleration that is believed
@@ -51,6 +54,7 @@ class MapPrediction:
         self._following = LaneFollowing(config.matching, roadmap, self._paths)
         self._motion = LaneMotion(config.motion, self._paths)
         self._changes = LaneChanges(config.changes, roadmap, self._paths)
+        self._walking = Walking(config.walking, roadmap.walkways)
         self._time = math.nan
         self._speeds: dict[int, tuple[float, float]] = {}  # by track: [m/s], its trend [m/s^2]
 
@@ -66,19 +70,15 @@ class MapPrediction:
         trends = self._trends(tracked.ids.tolist(), speeds.tolist(), elapsed)
         reaches = self._motion.reach(speeds, trends)
         candidates = self._on_lanes(tracked, speeds, reaches, elapsed)
-        owners, probabilities, poses, lanes = self._along_lanes(tracked, candidates, speeds, trends, reaches)
-        rest = (np.bincount(owners, minlength=len(speeds)) == 0).nonzero()[0]
-        owners = np.concatenate([owners, rest])
-        order = owners.argsort(kind="stable")
-        poses = np.concatenate([poses, self._straight_on(tracked, rest, speeds)])
-        lanes += [self._following.lanes_of(track) for track in tracked.ids[rest].tolist()]
-        return PredictedObjects(
-            objects=tracked,
-            owners=owners[order],
-            probabilities=np.concatenate([probabilities, np.ones(len(rest))])[order],
-            poses=poses[order],
-            lanes=tuple(lanes[row] for row in order.tolist()),
-        )
+        parts = [self._along_lanes(tracked, candidates, speeds, trends, reaches)]
+        walkers = ((tracked.classes == _PERSON) & (speeds >= self._config.standing_speed)).nonzero()[0]
+        if walkers.size:
+            parts.append(self._walking.hypotheses(tracked, walkers))
+        is_left = np.ones(len(speeds), dtype=np.bool_)
+        for part in parts:
+            is_left[part.owners] = False
+        parts.append(self._straight_on(tracked, is_left.nonzero()[0], speeds))
+        return message_of(tracked, *parts)
 
     def _trends(self, tracks: list[int], speeds: list[float], elapsed: float) -> Floats:
         """Smoothed rates of change of the objects' speeds (n,) [m/s^2]; 0 for new objects."""
@@ -116,10 +116,8 @@ class MapPrediction:
 
     def _along_lanes(
         self, tracked: TrackedObjects, candidates: Candidates, speeds: Floats, trends: Floats, reaches: Floats
-    ) -> tuple[Integers, Floats, Floats, list[tuple[str, ...]]]:
+    ) -> Hypotheses:
         """The candidates and lane changes that differ within the horizon.
-
-        Their owners (h,), probabilities (h,), poses (h, t, 3) and lanes.
 
         Cars seek the lane's centre, bicycles keep their side of it.
         """
@@ -127,7 +125,7 @@ class MapPrediction:
         candidates, drifts = self._changes.added(candidates, drifts, tracked, reaches)
         owners, paths, probabilities, places = candidates
         if not len(owners):
-            return owners, probabilities, np.empty((0, len(PREDICTION_TIMES), 3)), []
+            return Hypotheses(owners, probabilities, np.empty((0, len(PREDICTION_TIMES), 3)), [])
         own = speeds[owners]
         stations = self._motion.travelled(paths, places.stations, own, trends[owners], float(reaches[owners].max()))
         is_bicycle = tracked.classes[owners] == _BICYCLE
@@ -147,7 +145,7 @@ class MapPrediction:
         poses[:, 0] = tracked.boxes[owners, :3]
         ends = zip(paths, stations[:, 0].tolist(), stations[:, -1].tolist(), strict=True)
         lanes = [path.lanes_between(start, end) for path, start, end in ends]
-        return _told_apart(owners, probabilities, poses, lanes)
+        return _told_apart(Hypotheses(owners, probabilities, poses, lanes))
 
     def _cut(self, paths: list[LanePath], stations: Floats, lengths: Floats) -> Floats:
         """How far to the left of its path the middle of a long body is where its ends are on it (h,) [m]."""
@@ -157,29 +155,29 @@ class MapPrediction:
         cut: Floats = gaps[:, 1] * np.cos(on_path[:, 2]) - gaps[:, 0] * np.sin(on_path[:, 2])
         return cut
 
-    def _straight_on(self, tracked: TrackedObjects, rows: Integers, speeds: Floats) -> Floats:
-        """Constant velocity (n, t, 3), which is none for a standing vehicle or obstacle."""
+    def _straight_on(self, tracked: TrackedObjects, rows: Integers, speeds: Floats) -> Hypotheses:
+        """Constant velocity, which is none for a standing vehicle or obstacle."""
         poses = np.empty((len(rows), len(PREDICTION_TIMES), 3))
         poses[:] = tracked.boxes[rows, None, :3]
         stands = (speeds < self._config.standing_speed) & (tracked.classes != _PERSON)
         moves = (~stands[rows]).nonzero()[0]
         if moves.size:
             poses[moves, :, :2] += tracked.velocities[rows[moves], None] * PREDICTION_TIMES[:, None]
-        return poses
+        lanes = [self._following.lanes_of(track) for track in tracked.ids[rows].tolist()]
+        return Hypotheses(rows, np.ones(len(rows)), poses, lanes)
 
 
-def _told_apart(
-    owners: Integers, probabilities: Floats, poses: Floats, lanes: list[tuple[str, ...]]
-) -> tuple[Integers, Floats, Floats, list[tuple[str, ...]]]:
+def _told_apart(hypotheses: Hypotheses) -> Hypotheses:
     """One of each object's candidates that follow the same lanes: they part beyond the horizon only."""
+    owners, probabilities, poses, lanes = hypotheses
     first: dict[tuple[int, tuple[str, ...]], int] = {}
     same = [first.setdefault(key, row) for row, key in enumerate(zip(owners.tolist(), lanes, strict=True))]
     if len(first) == len(lanes):
-        return owners, probabilities, poses, lanes
+        return hypotheses
     kept = list(first.values())
     sums = np.zeros(len(lanes))
     np.add.at(sums, same, probabilities)
-    return owners[kept], sums[kept], poses[kept], [lanes[row] for row in kept]
+    return Hypotheses(owners[kept], sums[kept], poses[kept], [lanes[row] for row in kept])
 
 
 def _is_wheeled(tracked: TrackedObjects) -> npt.NDArray[np.bool_]:

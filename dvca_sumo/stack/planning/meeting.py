@@ -20,6 +20,7 @@ _CUTS_IN = 0.5  # [m] moved sideways before the meeting: the other comes into ou
 _OFF_LANE = 0.5  # [m] of the body beyond the edge of its lane, by the line, not by what it swerves for
 _STAYS = 2  # columns of the graph, after which somebody is on the path to drive along it
 _HARD_GAP = 0.5  # [m] to the other's way, defended by hard braking
+_STILL_TO_CROSS = 2  # lanes of a person's future: a pavement, then a crossing
 _LEAST_ROOM = 0.1  # [m]
 _CREEPING = 1.5  # [m/s] no faster, an ego stands still for people who come up to its side: ...
 _BESIDE_PERSON = 1.0  # ... [m] behind its front bumper, and all along it ...
@@ -120,15 +121,17 @@ class Meetings:
         return after
 
     def _others_first(self, row: int, graph: Graph, views: list[LineView]) -> bool:
-        """Whether the other has priority. People have; on junctions the map tells; who leaves its lane has not.
+        """Whether the other has priority. People have, but before a crossing where they have to wait.
+
+        On junctions the map tells; who leaves its lane has not.
 
         That is the ego itself where its line has left the lane, in turns that it cannot drive within.
         """
         scene = graph.scene
-        if scene.classes[scene.owners[row]] == _PERSON:
-            return True
         near, far = (graph.window.station + float(ends[row, graph.first[row]]) for ends in (graph.low, graph.high))
         told = has_priority(views, near, far, scene.lanes[row])
+        if scene.classes[scene.owners[row]] == _PERSON:
+            return told is not False or len(scene.lanes[row]) < _STILL_TO_CROSS
         return told if told is not None else self._is_off_lane(graph) or not self._cuts_in(row, graph)
 
     def _is_off_lane(self, graph: Graph) -> bool:

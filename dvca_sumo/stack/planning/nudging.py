@@ -207,7 +207,10 @@ class NudgeDecider:
             return True
         kind = situation.scene.classes[blocker.row]
         if kind == _PERSON and self._is_near_line(blocker.high, situation.views):
-            return False  # who waits at a crossing will go
+            has_stopped = bool(self._held) or situation.speed < self._config.standing_speed
+            stood = situation.time - self._since.get(blocker.track, situation.time)
+            if not has_stopped or stood < self._config.person_patience:
+                return False  # who waits at a crossing will go
         if kind != _STATIC:
             stood = situation.time - self._since[blocker.track]
             patience = self._config.broken_down_after if self._is_in_traffic(blocker, situation) else 0.0

@@ -79,8 +79,9 @@ def graph_of(
     stretch[BEHIND:] = path.arcs - np.arange(count)
     centres = futures.stations + stretch[rows[0]]
     low, high = centres - futures.half_lengths, centres + futures.half_lengths
-    margins = _margins(scene, window, route.crossings, config)
+    margins = _margins(scene, gaps, window, route.crossings, config)
     occupied = gaps < margins[:, None]
+    _let_leave(occupied, scene, gaps, config)
     occupied &= (high > -shape.rear_overhang) & (futures.stations < count - 2)
     for overpass in route.overpasses:
         _pass_over(occupied, overpass, scene, window)
@@ -147,8 +148,13 @@ def _has_lane_room(scene: Scene, window: Window, shape: VehicleShape) -> Flags:
     return has_room
 
 
-def _margins(scene: Scene, window: Window, crossings: tuple[Crossing, ...], config: PlanningConfig) -> Floats:
-    """(h,) sideways distance within which a future counts as in the way [m]."""
+def _margins(
+    scene: Scene, gaps: Floats, window: Window, crossings: tuple[Crossing, ...], config: PlanningConfig
+) -> Floats:
+    """(h,) sideways distance within which a future counts as in the way [m].
+
+    It is wider for people who walk across, unless they stay clear of the ego's way or walk away from it.
+    """
     classes = scene.classes[scene.owners]
     margins = np.where(classes == _BICYCLE, config.bicycle_margin, config.object_margin)
     people = classes == _PERSON
@@ -157,12 +163,22 @@ def _margins(scene: Scene, window: Window, crossings: tuple[Crossing, ...], conf
     offsets, stations = scene.futures.offsets, scene.futures.stations[:, 0] + window.station
     walked = np.abs(offsets[:, 1] - offsets[:, 0])
     across = people & (walked > _WALKS_ACROSS * (PREDICTION_TIMES[1] - PREDICTION_TIMES[0]))
+    across &= gaps.min(axis=1) < config.person_margin
     margins[people] = config.person_margin
     margins[across] = config.crossing_person_margin
     for crossing in crossings:
         begin, end = crossing.start_station - _AT_CROSSING, crossing.end_station + _AT_CROSSING
         margins[across & (stations > begin) & (stations < end)] = config.crossing_margin
     return margins
+
+
+def _let_leave(occupied: Flags, scene: Scene, gaps: Floats, config: PlanningConfig) -> None:
+    """Free the path of people who walk away from it, their nearest moment past."""
+    people = (scene.classes[scene.owners] == _PERSON).nonzero()[0]
+    if people.size:
+        gaps = gaps[people]
+        leaves = np.arange(gaps.shape[1]) > gaps.argmin(axis=1)[:, None]
+        occupied[people] &= ~(leaves & (gaps >= config.person_margin))
 
 
 def leading(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> tuple[list[int], list[int]]:

@@ -10,6 +10,7 @@ from planned_drives import SHAPE, Actor, Drive, assert_drivable, car, cone, curv
 from dvca_sumo.geometry.boxes import box_of, outlines
 from dvca_sumo.messages import ObjectClass
 from dvca_sumo.roadmap.route import Control
+from dvca_sumo.stack.planning import PlanningConfig
 
 
 def offsets(driven: Drive) -> tuple[float, float]:
@@ -92,11 +93,17 @@ def test_car_that_queues_behind_others_up_to_a_signal_is_not_passed() -> None:
     assert driven.speeds[-1] == 0.0
 
 
-def test_lane_is_not_left_for_a_person_who_waits_by_a_crossing() -> None:
+def test_lane_is_not_left_for_a_person_who_waits_by_a_crossing_unless_they_do_for_long() -> None:
     route = road(lanes_left=1, stop_lines=[stop_line(120.0, Control.PRIORITY, yields_to=frozenset())])
-    driven = drive(route, 30.0, speed=10.0, actors=[person(5, 117.0, -1.35)])
-    assert offsets(driven)[1] < 0.85
-    assert driven.speeds[-1] == 0.0
+    driven = drive(route, 30.0, speed=10.0, actors=[person(5, 117.0, -1.35), person(6, 118.0, -1.3)])
+    before = driven.states[:, 2] < 0.1
+    assert driven.speeds[before].min() < 0.5
+    assert driven.clearances.min() > 0.35
+    assert driven.fronts[-1] > 125.0
+    patient = msgspec.structs.replace(PlanningConfig(), person_patience=30.0)
+    waiting = drive(route, 30.0, speed=10.0, actors=[person(5, 117.0, -1.35)], config=patient)
+    assert offsets(waiting)[1] < 0.85
+    assert waiting.speeds[-1] == 0.0
     apart = drive(road(lanes_left=1), 30.0, speed=10.0, actors=[person(5, 117.0, -1.35)])
     assert offsets(apart)[1] > 1.0
     assert apart.fronts[-1] > 150.0

@@ -144,9 +144,38 @@ def test_person_about_to_use_a_crossing_is_waited_for_before_it() -> None:
     driven = drive(
         road(crossings=[crossing]), 25.0, speed=10.0, actors=[person(3, 100.0, -6.0, heading=UP, speed=1.2, leaves=3.0)]
     )
-    assert driven.clearances.min() > 1.5
+    assert driven.clearances.min() > 1.0
     assert "yield 3" in driven.decisions
     assert driven.fronts[-1] > 120.0
+
+
+@pytest.mark.parametrize(
+    ("lanes", "yields_to", "is_waited_for"),
+    [
+        (("pavement", "c"), frozenset({"c"}), True),  # about to use a crossing where people go first
+        (("pavement", "c"), frozenset(), False),  # ... and one where they have to wait
+        (("c",), frozenset(), True),  # on it, they always go first
+        ((), frozenset(), True),
+    ],
+)
+def test_people_go_first_but_before_a_crossing_where_they_have_to_wait(
+    lanes: tuple[str, ...],
+    yields_to: frozenset[str],
+    is_waited_for: bool,  # noqa: FBT001
+) -> None:
+    line = stop_line(90.0, Control.PRIORITY, yields_to=yields_to, crosses=frozenset({"c"}))
+    walker = person(3, 96.0, -5.0, heading=UP, speed=1.2, stays_from=1.0, lanes=lanes)
+    route = road(stop_lines=[line], crossings=[Crossing("c", 94.0, 98.0)])
+    driven = drive(route, 1.0, station=55.0, speed=12.0, actors=[walker])
+    assert ("yield 3" in driven.decisions) is is_waited_for
+
+
+def test_behind_people_who_walk_away_the_ego_drives_on() -> None:
+    """They are 0.6 m beside its way."""
+    crossing = Crossing("c", 108.0, 112.0)
+    walker = person(3, 110.0, 1.8, heading=UP, speed=1.2)
+    driven = drive(road(crossings=[crossing]), 1.0, station=100.0, actors=[walker])
+    assert driven.speeds[-1] > 1.0
 
 
 def test_car_with_priority_from_a_side_road_is_yielded_to() -> None:

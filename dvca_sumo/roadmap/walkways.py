@@ -1,0 +1,93 @@
+"""Ground for people on foot: pavements, the walking areas of junctions, and the crossings between them."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from dvca_sumo.geometry.polyline import Floats
+from dvca_sumo.roadmap.areas import polygon
+from dvca_sumo.roadmap.lanes import Lane
+from dvca_sumo.roadmap.reading import NetContents
+
+_KERB = 0.25  # [m] beyond its edge one is still on a ground
+_TOUCHING = 0.5  # [m] between grounds that are next to each other, and from them to their crossings, at most
+
+
+class Way(NamedTuple):
+    """A crossing, straight from one of its ends."""
+
+    lane: str
+    entry: tuple[float, float]  # [m] the middle of that end
+    direction: tuple[float, float]  # of unit length, across the road
+    half_width: float  # [m]
+
+
+class Ground(NamedTuple):
+    """One pavement or walking area."""
+
+    lane: str
+    edges: shapely.Geometry  # of it and of the grounds next to it, together
+    ways: tuple[Way, ...]  # the crossings that begin here
+
+
+class Walkways:
+    """Which ground or crossing somebody is on, and where they may go from there."""
+
+    def __init__(self, net: NetContents) -> None:
+        crossings = [lane for lane in net.lanes.values() if lane.is_crossing]
+        shapes = {lane.id: _strip(lane) for lane in crossings}
+        shapes |= {lane.id: _strip(lane) for lane in net.lanes.values() if lane.is_pavement}
+        for junction in net.junctions.values():
+            shapes |= {lane: polygon(shape) for lane, shape in junction.walking.items()}
+        self._lanes = list(shapes)
+        self._tree = shapely.STRtree(list(shapes.values()))
+        self._crossings = len(crossings)  # come first
+        self._ways = [way for lane in crossings for way in _ways(lane)]
+        self._entries = shapely.STRtree([shapely.Point(way.entry) for way in self._ways])
+        self._known: dict[int, Ground] = {}
+
+    def under(self, points: Floats) -> list[Ground | str | None]:
+        """For each of `points` (n, 2) the ground it lies on, else the lane id of the crossing; None on neither."""
+        places: list[Ground | str | None] = [None] * len(points)
+        rows, found = self._tree.query(shapely.points(points), predicate="dwithin", distance=_KERB)
+        for row, number in sorted(zip(rows.tolist(), found.tolist(), strict=True)):
+            is_crossing = number < self._crossings
+            places[row] = self._lanes[number] if is_crossing else self._ground(number)
+        return places
+
+    def _ground(self, number: int) -> Ground:
+        if number not in self._known:
+            shape = self._tree.geometries[number]
+            near = np.sort(self._tree.query(shape, predicate="dwithin", distance=_TOUCHING))
+            grounds = self._tree.geometries[near[near >= self._crossings]]
+            grown = shapely.union_all(shapely.buffer(grounds, 0.5 * _TOUCHING, join_style="mitre"))
+            together = shapely.buffer(grown, -0.5 * _TOUCHING, join_style="mitre")
+            ways = np.sort(self._entries.query(shape, predicate="dwithin", distance=_TOUCHING)).tolist()
+            self._known[number] = Ground(
+                self._lanes[number], shapely.boundary(together), tuple(self._ways[way] for way in ways)
+            )
+        return self._known[number]
+
+
+def room(points: Floats, directions: Floats, lengths: Floats, grounds: Sequence[Ground]) -> Floats:
+    """How far one gets from `points` (n, 2) along unit `directions` (n, 2) before the ground ends (n,) [m].
+
+    At most `lengths` (n,).
+    """
+    rays = shapely.linestrings(np.stack((points, points + directions * lengths[:, None]), axis=1))
+    hits = shapely.intersection(rays, [ground.edges for ground in grounds])
+    found: Floats = np.where(shapely.is_empty(hits), lengths, shapely.distance(shapely.points(points), hits))
+    return found
+
+
+def _strip(lane: Lane) -> shapely.Geometry:
+    return shapely.buffer(shapely.linestrings(lane.line.points), 0.5 * lane.width, cap_style="flat")
+
+
+def _ways(lane: Lane) -> tuple[Way, Way]:
+    begin, end = lane.line.points[0], lane.line.points[-1]
+    x, y = ((end - begin) / np.hypot(*(end - begin))).tolist()
+    half = 0.5 * lane.width
+    return Way(lane.id, tuple(begin.tolist()), (x, y), half), Way(lane.id, tuple(end.tolist()), (-x, -y), half)

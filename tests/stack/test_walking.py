@@ -1,0 +1,135 @@
+"""People on a crossing of two streets with pavements and a crossing over each arm."""
+
+import math
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sumolib
+
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, ObjectClass, PredictedObjects, TrackedObjects
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.stack.prediction import MapPrediction, PredictionConfig
+
+NODES = """<nodes>
+    <node id="w" x="-100" y="0"/><node id="e" x="100" y="0"/><node id="s" x="0" y="-100"/><node id="n" x="0" y="100"/>
+    <node id="x" x="0" y="0" type="priority"/>
+</nodes>"""
+EDGES = "<edges>{}</edges>".format(
+    "".join(
+        f'<edge id="{a}{b}" from="{a}" to="{b}" speed="10"/>' for arm in "wesn" for a, b in ((arm, "x"), ("x", arm))
+    )
+)
+SPEED = 1.4  # [m/s]
+
+
+@pytest.fixture(scope="module")
+def roadmap(tmp_path_factory: pytest.TempPathFactory) -> RoadMap:
+    folder: Path = tmp_path_factory.mktemp("streets")
+    (folder / "nodes.xml").write_text(NODES)
+    (folder / "edges.xml").write_text(EDGES)
+    command = [sumolib.checkBinary("netconvert"), "-n", "nodes.xml", "-e", "edges.xml", "-o", "net.xml"]
+    command += ["--sidewalks.guess", "--crossings.guess", "--offset.disable-normalization"]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)  # noqa: S603 - SUMO's own program
+    return RoadMap.load(folder / "net.xml")
+
+
+def walking(roadmap: RoadMap, place: Floats, heading: float, speed: float = SPEED) -> PredictedObjects:
+    tracked = TrackedObjects(
+        time=0.0,
+        ids=np.array([1]),
+        classes=np.array([int(ObjectClass.PEDESTRIAN)]),
+        boxes=np.array([[*place, heading, 0.5, 0.6]]),
+        velocities=speed * np.array([[math.cos(heading), math.sin(heading)]]),
+        signals={},
+    )
+    return MapPrediction(PredictionConfig(), roadmap).step(tracked)
+
+
+def towards(begin: Floats, end: Floats) -> float:
+    return math.atan2(end[1] - begin[1], end[0] - begin[0])
+
+
+def pavement(roadmap: RoadMap) -> tuple[Floats, float, str]:
+    """A place in the middle of the pavement south of the street from the west, and the street's direction."""
+    lane = roadmap.lanes["wx_0"]
+    assert lane.is_pavement
+    x, y, heading = lane.line.poses([50.0])[0].tolist()
+    return np.array([x, y]), heading, lane.id
+
+
+def crossing(roadmap: RoadMap) -> tuple[str, Floats, Floats]:
+    """The crossing over the western arm, from its southern end."""
+    found = [lane for lane in roadmap.lanes.values() if lane.is_crossing]
+    lane = min(found, key=lambda one: float(one.line.points[:, 0].mean()))
+    begin, end = sorted((lane.line.points[0], lane.line.points[-1]), key=lambda point: float(point[1]))
+    return lane.id, begin, end
+
+
+def test_along_the_pavement_they_walk_straight_on(roadmap: RoadMap) -> None:
+    place, heading, lane = pavement(roadmap)
+    found = walking(roadmap, place, heading)
+    ways = SPEED * PREDICTION_TIMES[:, None] * np.array([math.cos(heading), math.sin(heading)])
+    assert found.poses[:, :, :2] == pytest.approx((place + ways)[None])
+    assert found.lanes == ((lane,),)
+
+
+def test_aslant_to_the_kerb_they_stay_on_the_pavement(roadmap: RoadMap) -> None:
+    place, heading, _ = pavement(roadmap)
+    kerb = float(place[1]) + 1.0
+    found = walking(roadmap, place, heading + 0.2)
+    assert found.probabilities.tolist() == [1.0]
+    assert kerb - 0.4 < found.poses[0, -1, 1] < kerb
+
+
+def test_about_to_step_off_the_pavement_they_are_taken_to_cross_the_road(roadmap: RoadMap) -> None:
+    place, _, _ = pavement(roadmap)
+    found = walking(roadmap, place, math.pi / 2.0)
+    assert found.poses[0, -1, 1] == pytest.approx(place[1] + SPEED * PREDICTION_TIMES[-1])
+
+
+def test_on_the_way_to_a_crossing_they_may_use_it_or_not(roadmap: RoadMap) -> None:
+    lane, begin, end = crossing(roadmap)
+    across = (end - begin) / np.hypot(*(end - begin))
+    place = begin - 1.5 * across + np.array([-0.5, 0.0])
+    found = walking(roadmap, place, towards(place, begin))
+    uses = [row for row, lanes in enumerate(found.lanes) if lanes[-1] == lane]
+    assert len(uses) == 1
+    assert len(found.lanes[uses[0]]) == 2
+    assert found.probabilities == pytest.approx(1.0 / len(found.owners))
+    last = found.poses[uses[0], -1, :2]
+    walked = np.hypot(*np.diff(found.poses[uses[0], :, :2], axis=0).T).sum()
+    assert (last - begin) @ across == pytest.approx(SPEED * 6.0 - 1.5, abs=0.2)
+    assert walked == pytest.approx(SPEED * 6.0, abs=0.1)
+    (other,) = (row for row in range(len(found.owners)) if len(found.lanes[row]) == 1)
+    assert (found.poses[other, -1, :2] - begin) @ across < 0.1
+
+
+def test_away_from_a_crossing_they_do_not_use_it(roadmap: RoadMap) -> None:
+    lane, begin, end = crossing(roadmap)
+    across = (end - begin) / np.hypot(*(end - begin))
+    place = begin - 1.5 * across
+    assert all(lanes[-1] != lane for lanes in walking(roadmap, place, towards(begin, place)).lanes)
+
+
+def test_on_a_crossing_they_go_straight_on(roadmap: RoadMap) -> None:
+    lane, begin, end = crossing(roadmap)
+    place = 0.5 * (begin + end)
+    found = walking(roadmap, place, towards(begin, end))
+    assert found.lanes == ((lane,),)
+    assert np.hypot(*(found.poses[0, -1, :2] - place)) == pytest.approx(SPEED * 6.0)
+
+
+def test_on_the_road_they_go_straight_on(roadmap: RoadMap) -> None:
+    place = np.array([-50.0, -1.0])
+    found = walking(roadmap, place, 0.3)
+    assert found.lanes == ((),)
+    assert np.hypot(*(found.poses[0, -1, :2] - place)) == pytest.approx(SPEED * 6.0)
+
+
+def test_who_stands_at_a_crossing_stays_there(roadmap: RoadMap) -> None:
+    _, begin, end = crossing(roadmap)
+    found = walking(roadmap, begin, towards(begin, end), speed=0.1)
+    assert len(found.owners) == 1
+    assert np.hypot(*(found.poses[0, -1, :2] - begin)) < 1.0
