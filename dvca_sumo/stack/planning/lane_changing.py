@@ -77,11 +77,13 @@ class LaneChanger:
             return LaneChoice()
         stop = last_stop(change, window, last - self._lane, speed, self._shape, self._config)
         has_to = is_last_chance(stop, speed)
+        is_hurried = stop.at < self._config.change_hurry * speed
         occupied = self._gaps.occupied(change, window.station, objects)
         target = self._lane
         while target < last:
             is_pressed = has_to or target < self._target
-            if not self._gaps.is_free(occupied[target + 1], change, window, speed, is_pressed=is_pressed):
+            lane = occupied[target + 1]
+            if not self._gaps.is_free(lane, change, window, speed, is_pressed=is_pressed, is_hurried=is_hurried):
                 break
             target += 1
         width, beside = change.widths[self._lane], occupied[self._lane + 1]

@@ -5,6 +5,7 @@ model, 2007).
 """
 
 import math
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -23,6 +24,8 @@ _SLOWEST = 2.0  # [m/s] beside a gap ...
 _FALLING_BACK = 5.0  # [m/s] ... and for one that is yet to come, which the ego does not wait for before it has to
 _WITHIN = 0.3  # of its way to the next lane, the ego's body stays in its own
 _SEEN = 120.0  # [m] before and behind the ego
+_PAST = 3.5  # times the distance to who is behind, the next lane is in view past them: by the width of cars on lanes
+_NEAR = 30.0  # [m] of effort, beyond which another place is looked for
 _CATCHES_UP = 0.8  # of the ego's speed: slower ones are come up to ...
 _FORWARD = 3.0  # ... while a gap beside faster ones is that much harder to get to than one farther back
 
@@ -35,6 +38,14 @@ class Neighbours(msgspec.Struct, frozen=True, eq=False):
     speeds: Floats  # (m,) [m/s]
     is_traffic: Flags  # (m,) heading its way: not parked beside it or across, nor just standing about
     tracks: list[int]  # (m,)
+
+
+class _Slot(NamedTuple):
+    """A place behind somebody on the next lane."""
+
+    effort: float  # [m] how hard it is to get to
+    shift: float  # [m] how much farther ahead it is than the ego's nose
+    pace: float  # [m/s] of who is before it
 
 
 class Gaps:
@@ -68,8 +79,17 @@ class Gaps:
             found.append(Neighbours(places - halves, places + halves, speeds[rows], is_traffic, tracks))
         return found
 
-    def is_free(self, lane: Neighbours, change: LaneChange, window: Window, speed: float, *, is_pressed: bool) -> bool:
-        """Whether nobody on the lane has to brake more than a little when the ego is there.
+    def is_free(
+        self,
+        lane: Neighbours,
+        change: LaneChange,
+        window: Window,
+        speed: float,
+        *,
+        is_pressed: bool,
+        is_hurried: bool = False,
+    ) -> bool:
+        """Whether nobody on the lane has to brake more than a little when the ego is there; hurried, at once.
 
         That is where the change can begin, those on the lane keeping their speeds until then; pressed, where
         the body gets over the marking. Thus it takes up what those who stop for it offer.
@@ -77,7 +97,7 @@ class Gaps:
         if not lane.tracks:
             return True
         config, shape = self._config, self._shape
-        headway, braking = config.change_headway, config.change_braking
+        headway, braking = 0.0 if is_hurried else config.change_headway, config.change_braking
         ahead = max(change.start_station - window.station - shape.front, 0.0)
         wait = ahead / max(speed, LAST_SPEED)
         if is_pressed:
@@ -97,25 +117,50 @@ class Gaps:
         needed = config.change_gap + headway * followers + np.square(np.maximum(closing, 0.0)) / (2.0 * braking)
         return bool((gaps >= needed).all())
 
-    def pace(self, lane: Neighbours, change: LaneChange, window: Window, speed: float) -> float:
-        """The speed that brings the ego behind the nearest one on the lane who has room behind [m/s]."""
+    def is_in_sight(self, own: Neighbours, lane: Neighbours, wanted: float, speed: float) -> bool:
+        """Whether the ego sees far enough back on `lane`, past who is behind it on its `own`.
+
+        Somebody there who is not seen yet, as fast as who is seen or, where nobody is, as the speed `wanted` [m/s],
+        must not have to brake more than a little.
+        """
         config, shape = self._config, self._shape
+        pace = float(lane.speeds[lane.is_traffic].max()) if lane.is_traffic.any() else wanted
+        closing = max(pace - speed, 0.0)
+        needed = config.change_gap + config.change_headway * pace + closing * closing / (2.0 * config.change_braking)
+        nearest = float(own.fronts[own.fronts < 0.0].max(initial=-_SEEN))
+        sight = min(_PAST * (shape.centre - nearest), _SEEN) - 0.5 * shape.length
+        return closing == 0.0 or sight >= needed
+
+    def pace(self, lane: Neighbours, change: LaneChange, window: Window, speed: float) -> float:
+        """The speed that brings the ego behind the nearest one on the lane who has room behind [m/s].
+
+        Where nobody near has, that is one who has room but for headways: in the end those are not asked for.
+        """
+        config = self._config
         if not lane.tracks or change.start_station - window.station > config.change_outlook:
             return math.inf
-        wanted = lane.rears - config.change_gap - config.change_headway * speed  # for the nose, behind each
-        has_room = np.ones(len(wanted), dtype=np.bool_)
-        has_room[:-1] = wanted[:-1] - shape.length - lane.fronts[1:] >= (
-            config.change_gap + config.change_headway * lane.speeds[1:]
-        )
-        shifts = wanted - shape.front
-        ahead = max(change.start_station - window.station - shape.front, 0.0)
+        ahead = max(change.start_station - window.station - self._shape.front, 0.0)
+        slot = self._slot(lane, ahead, speed, config.change_headway)
+        if slot is None or slot.effort > _NEAR:
+            slot = min((one for one in (self._slot(lane, ahead, speed, 0.0), slot) if one), default=None)
+        if slot is None:
+            return math.inf
+        if slot.shift < 0.0:
+            return max(slot.pace + slot.shift / config.change_time, _FALLING_BACK)
+        return max(slot.pace + math.sqrt(2.0 * config.change_braking * slot.shift), _SLOWEST)
+
+    def _slot(self, lane: Neighbours, ahead: float, speed: float, headway: float) -> _Slot | None:
+        """The place behind somebody on the lane that is the easiest to get to, if there is one."""
+        config, shape = self._config, self._shape
+        wanted = lane.rears - config.change_gap - headway * speed  # for the nose, behind each
+        spare = np.zeros(len(wanted))
+        spare[:-1] = wanted[:-1] - shape.length - lane.fronts[1:] - config.change_gap - headway * lane.speeds[1:]
+        has_room = spare >= 0.0
+        shifts = wanted - shape.front - 0.5 * np.minimum(spare, config.change_gap)
         is_in_reach = has_room & ((lane.speeds > config.moving_speed) | (shifts >= ahead))
         if not is_in_reach.any():
-            return math.inf
+            return None
         is_faster = lane.speeds > _CATCHES_UP * speed
         efforts = np.where(shifts > 0.0, np.where(is_faster, _FORWARD, 1.0) * shifts, -shifts)
-        slot = int(np.where(is_in_reach, efforts, np.inf).argmin())
-        shift, pace = float(shifts[slot]), float(lane.speeds[slot])
-        if shift < 0.0:
-            return max(pace + shift / config.change_time, _FALLING_BACK)
-        return max(pace + math.sqrt(2.0 * config.change_braking * shift), _SLOWEST)
+        row = int(np.where(is_in_reach, efforts, np.inf).argmin())
+        return _Slot(float(efforts[row]), float(shifts[row]), float(lane.speeds[row]))

@@ -160,3 +160,13 @@ def test_it_goes_in_front_of_one_that_stays_beside_its_rear_when_the_queue_drive
     assert driven.clearances.min() > 0.3
     assert lane_at(driven, LATEST) == pytest.approx(1.0, abs=0.1)
     assert_drivable(driven)
+
+
+def test_shortly_before_the_end_of_its_lane_it_takes_a_gap_that_leaves_no_headway() -> None:
+    """Between cars 16 m apart, as they drive off from a queue: it stays beside one such gap until then."""
+    cars = [car(10 + number, -200.0 + 16.0 * number, WIDTH, speed=9.0) for number in range(60)]
+    driven = drive(crossing_over(), 39.0, speed=9.0, actors=cars)
+    assert driven.speeds.min() > 7.0
+    assert driven.clearances.min() > 1.0
+    assert lane_at(driven, 330.0) == pytest.approx(0.0, abs=0.1)
+    assert driven.states[-1, 2] > 0.3 * WIDTH

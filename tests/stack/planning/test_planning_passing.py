@@ -103,3 +103,12 @@ def test_it_comes_back_before_its_lane_to_pass_on_ends() -> None:
     over = driven.fronts[np.abs(driven.states[:, 2]) > 0.5 * WIDTH]
     assert over.max() < 400.0
     assert driven.clearances.min() > 1.0
+
+
+@pytest.mark.parametrize(("hides", "expected"), [(False, [0, 1]), (True, [0])])
+def test_from_a_queue_it_pulls_out_only_where_it_sees_far_enough_back(hides: bool, expected: list[int]) -> None:  # noqa: FBT001
+    """The one behind hides whoever comes on the next lane."""
+    behind = [car(9, 97.0, speed=1.7, size=(7.1, 2.4))] if hides else []
+    ahead = [car(7, 118.0, speed=1.5), car(6, 130.0, speed=1.5), car(8, 130.0, WIDTH, speed=12.0)]
+    driven = drive(beside(), 8.0, station=105.0, actors=[*ahead, *behind])
+    assert lanes(driven) == expected
