@@ -3,8 +3,9 @@
 The rule: a body appears within sight without having come there (it was inserted, or teleported), or one of its ends
 moves farther in one step than its speed allows (a jump; SUMO's lane changes are such jumps, and so are its turns on the
 spot), and at that moment it touches the ego, or it is so close in the ego's way that full braking after a reaction
-would not keep the ego off it. Or a person walks into an ego that has stood for a second: SUMO's people walk through
-vehicles. For a while after, violations with that body are the simulator's doing.
+would not keep the ego off it; a person who appears need only be within a step of the ego. Or a person walks into an ego
+that has stood for a second: SUMO's people walk through vehicles. For a while after, violations with that body are the
+simulator's doing.
 """
 
 import math
@@ -23,9 +24,11 @@ LEAP = 1.0  # [m] in one step, beyond what the greater of its speeds before and 
 REACTION = 0.5  # [s]
 BRAKING = 8.0  # [m/s^2]
 TOUCHING = 0.2  # [m]
+STEP = 0.75  # [m] people get so far before anybody reacts
 STOOD = 1.0  # [s]
 LASTING = 5.0  # [s]
 _STANDING = 0.1  # [m/s]
+_PERSON = int(ObjectClass.PEDESTRIAN)
 
 
 class Disturbance(msgspec.Struct, frozen=True):
@@ -88,14 +91,15 @@ class Disturbances:
         )
         if chosen.size == 0:
             return []
-        touching = chosen[distances(self._places.at(moment).box, objects.boxes[chosen]) < TOUCHING].tolist()
+        nearest = np.where(objects.classes[chosen] == _PERSON, STEP, TOUCHING)
+        touching = chosen[distances(self._places.at(moment).box, objects.boxes[chosen]) < nearest].tolist()
         found = ahead(self._places, moment, IN_SIGHT, rows=np.sort(chosen))
         closing = np.maximum(ego.speed - np.maximum(found.speeds, 0.0), 0.0)
         needed = REACTION * closing + closing * closing / (2.0 * BRAKING)
         return sorted({*touching, *found.rows[found.gaps < needed].tolist()})
 
     def _walking_in(self, moment: Moment) -> list[int]:
-        people = np.flatnonzero(moment.objects.classes == ObjectClass.PEDESTRIAN)
+        people = np.flatnonzero(moment.objects.classes == _PERSON)
         if people.size == 0:
             return []
         touching: list[int] = people[

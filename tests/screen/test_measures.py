@@ -117,14 +117,23 @@ def test_a_body_that_turns_on_the_spot_sweeps_over_the_road_at_no_speed_of_its_o
     assert disturbances(slowly, roads) == []
 
 
+@pytest.mark.parametrize(("beside", "expected"), [(0.5, [("person:p", "appeared")]), (1.0, [])])
+def test_a_person_who_appears_a_step_beside_the_ego_is_the_simulators_doing(
+    roads: RoadMap, beside: float, expected: list[tuple[str, str]]
+) -> None:
+    appears = moment(1.1, 53.2, 12.0, [("person:p", (50.0, LANE_Y - 0.9 - beside - 0.25), 0.0)])
+    assert disturbances([on_foot(one) for one in (*cruise(1.0, 12.0), appears)], roads) == expected
+
+
 @pytest.mark.parametrize(("stood", "fault"), [(0.5, Fault.OTHER), (2.0, Fault.SIMULATOR)])
 def test_a_person_who_walks_into_an_ego_that_has_stood_is_the_simulators_doing(
     roads: RoadMap, stood: float, fault: Fault
 ) -> None:
-    moments, steps = cruise(1.0, 4.0), round(10.0 * stood)
-    for k in range(1, steps + 1):
+    steps = 10 + round(10.0 * stood)
+    moments = []
+    for k in range(steps + 1):
         walker: Row = ("person:p", (42.0, LANE_Y - 1.1 - 0.12 * (steps - k)), 1.2)
-        moments.append(moment(1.0 + 0.1 * k, 44.0, 0.0, [walker]))
+        moments.append(moment(0.1 * k, min(40.0 + 0.4 * k, 44.0), 4.0 if k <= 10 else 0.0, [walker]))
     assert at_contact([on_foot(one) for one in moments], roads) == [("collision", fault)]
 
 
