@@ -2,10 +2,10 @@
 
 The rule: a body appears within sight without having come there (it was inserted, or teleported), or one of its ends
 moves farther in one step than its speed allows (a jump; SUMO's lane changes are such jumps, and so are its turns on the
-spot), and at that moment it touches the ego, or it is so close in the ego's way that full braking after a reaction
-would not keep the ego off it; a person who appears need only be within a step of the ego. Or a person walks into an ego
-that has stood for a second: SUMO's people walk through vehicles. For a while after, violations with that body are the
-simulator's doing.
+spot), and at that moment it touches the ego, or will before anybody reacts if both go on as they do, or it is so close
+in the ego's way that full braking after a reaction would not keep the ego off it; a person who appears need only be
+within a step of the ego. Or a person walks into an ego that has stood for a second: SUMO's people walk through
+vehicles. For a while after, violations with that body are the simulator's doing.
 """
 
 import math
@@ -13,7 +13,7 @@ import math
 import msgspec
 import numpy as np
 
-from dvca_sumo.geometry.boxes import distances
+from dvca_sumo.geometry.boxes import contact_times, distances
 from dvca_sumo.messages import Integers, ObjectClass
 from dvca_sumo.oracles import Places
 from dvca_sumo.oracles.ahead import ahead
@@ -92,7 +92,10 @@ class Disturbances:
         if chosen.size == 0:
             return []
         nearest = np.where(objects.classes[chosen] == _PERSON, STEP, TOUCHING)
-        touching = chosen[distances(self._places.at(moment).box, objects.boxes[chosen]) < nearest].tolist()
+        box, boxes = self._places.at(moment).box, objects.boxes[chosen]
+        velocity = ego.speed * np.array([math.cos(ego.heading), math.sin(ego.heading)])
+        touches = contact_times(box, velocity, boxes, objects.velocities[chosen], REACTION) < math.inf
+        touching = chosen[touches | (distances(box, boxes) < nearest)].tolist()
         found = ahead(self._places, moment, IN_SIGHT, rows=np.sort(chosen))
         closing = np.maximum(ego.speed - np.maximum(found.speeds, 0.0), 0.0)
         needed = REACTION * closing + closing * closing / (2.0 * BRAKING)

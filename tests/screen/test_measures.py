@@ -117,6 +117,22 @@ def test_a_body_that_turns_on_the_spot_sweeps_over_the_road_at_no_speed_of_its_o
     assert disturbances(slowly, roads) == []
 
 
+@pytest.mark.parametrize(("speed", "expected"), [(6.0, [("car", "jumped")]), (1.0, [])])
+def test_a_body_that_jumps_and_drives_into_the_ego_before_anybody_reacts_is_the_simulators_doing(
+    roads: RoadMap, speed: float, expected: list[tuple[str, str]]
+) -> None:
+    """It turns round on the spot beside the ego, and drives at its flank."""
+
+    def turned(time: float, heading: float) -> Moment:
+        one = moment(time, 50.0, 0.5, [("car", (0.0, 0.0), 0.0)])
+        boxes = np.array([[48.0, LANE_Y + 0.9 + 1.5 + 2.3, heading, 4.6, 1.8]])
+        velocities = speed * np.array([[math.cos(heading), math.sin(heading)]])
+        objects = msgspec.structs.replace(one.objects, boxes=boxes, velocities=velocities)
+        return msgspec.structs.replace(one, objects=objects)
+
+    assert disturbances([turned(0.0, math.pi / 2.0), turned(0.1, -math.pi / 2.0)], roads) == expected
+
+
 @pytest.mark.parametrize(("beside", "expected"), [(0.5, [("person:p", "appeared")]), (1.0, [])])
 def test_a_person_who_appears_a_step_beside_the_ego_is_the_simulators_doing(
     roads: RoadMap, beside: float, expected: list[tuple[str, str]]
@@ -155,14 +171,14 @@ def test_running_into_a_standing_car_is_the_drivers(roads: RoadMap) -> None:
 
 def test_being_run_into_from_behind_is_the_others_unless_the_ego_left_its_lane(roads: RoadMap) -> None:
     def hit(y: float) -> list[Moment]:
-        return [moment(0.1 * k, 60.0 + 0.5 * k, 5.0, [("tail", (50.0 + 1.5 * k, y), 15.0)], y=y) for k in range(6)]
+        return [moment(0.1 * k, 60.0 + 0.5 * k, 5.0, [("tail", (40.0 + 1.5 * k, y), 15.0)], y=y) for k in range(15)]
 
     assert at_contact(hit(LANE_Y), roads) == [("collision", Fault.OTHER)]
     assert at_contact(hit(LANE_Y + 1.6), roads) == [("collision", Fault.DRIVER)]
 
 
 def test_a_standing_ego_is_never_at_fault(roads: RoadMap) -> None:
-    moments = [moment(0.1 * k, 60.0, 0.0, [("tail", (50.0 + 1.5 * k, LANE_Y), 15.0)]) for k in range(6)]
+    moments = [moment(0.1 * k, 60.0, 0.0, [("tail", (40.0 + 1.5 * k, LANE_Y), 15.0)]) for k in range(12)]
     assert at_contact(moments, roads) == [("collision", Fault.OTHER)]
 
 
