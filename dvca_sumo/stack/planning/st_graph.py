@@ -191,7 +191,8 @@ def leading(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> tuple[
     rows = np.flatnonzero(graph.occupied[: scene.moving].any(axis=1))
     if not rows.size:
         return [], []
-    is_in_lane = (graph.gaps[rows, 0] < config.object_margin).tolist()
+    is_along = scene.futures.directions[rows, 0] > ALONG
+    is_in_lane = (is_along & (graph.gaps[rows, 0] < config.object_margin)).tolist()
     is_ahead = (scene.futures.stations[rows, 0] > shape.centre).tolist()
     is_beside = (scene.classes[scene.owners[rows]] == _PERSON) & (graph.low[rows, 0] < shape.front)
     chances = scene.probabilities[rows].tolist()

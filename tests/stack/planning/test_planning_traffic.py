@@ -39,6 +39,17 @@ def test_faster_leader_is_let_go() -> None:
     assert driven.speeds.min() > 12.9
 
 
+def test_back_from_a_turn_that_swings_out_the_ego_lets_those_pass_who_drive_where_it_turns_to() -> None:
+    """They come across the beginning of its turn, behind it, and are not behind it in its lane."""
+    curvature = np.repeat([0.0, 0.182, -0.04, 0.0], [60, 19, 18, 100])
+    headings = np.cumsum(curvature)
+    turn = np.column_stack((np.cumsum(np.cos(headings)), np.cumsum(np.sin(headings))))
+    for y, passes in ((3.6, True), (-30.0, False)):
+        other = car(3, 67.0, y, heading=2.76, speed=6.6)
+        driven = drive(road(turn), 0.8, station=74.5, actors=[other])
+        assert bool(driven.speeds[-1] < 0.3) == passes
+
+
 def test_leader_that_stops_is_stopped_behind() -> None:
     driven = drive(road(), 30.0, speed=10.0, actors=[car(3, 45.0, speed=9.0, stays_from=8.0)])
     assert driven.speeds[-1] == 0.0
