@@ -25,6 +25,7 @@ from dvca_sumo.stack.planning.passing import Passing
 from dvca_sumo.stack.planning.path import Path, lateral_start, path_along
 from dvca_sumo.stack.planning.reference import BEHIND, Reference
 from dvca_sumo.stack.planning.scene import scene_in
+from dvca_sumo.stack.planning.settling import Settling
 from dvca_sumo.stack.planning.speed import Profile, Stop, roll_out
 from dvca_sumo.stack.planning.st_graph import Graph, graph_of, leader_of, leading
 from dvca_sumo.stack.planning.start import StartState, start_state
@@ -50,6 +51,7 @@ class Planner:
         self._lane_changer = LaneChanger(route, shape, config)
         self._passing = Passing(route, shape, config)
         self._nudging = NudgeDecider(shape, config)
+        self._settling = Settling(config)
         self._meetings = Meetings(shape, config)
         self._previous: Trajectory | None = None
         self._station: float | None = None  # of the start state of the last cycle
@@ -115,7 +117,9 @@ class Planner:
         views = self._junctions.step(time, nose, station - shape.rear_overhang, start.speed, signals, predicted.objects)
         lateral = lateral_start(start, window, offset)
         nudges = self._nudging.step(Situation(time, start.speed, lateral, window, scene, views))
-        path = path_along(window, start, lateral, [nudge.plateau for nudge in nudges], shape, config)
+        settled = self._settling.step(lateral, station, start.speed)
+        plateaus = [nudge.plateau for nudge in nudges] or settled
+        path = path_along(window, start, lateral, plateaus, shape, config)
         graph = graph_of(scene, window, path, self._route, shape, config)
         profile = self._profile(start, graph, views, choice)
         return _points(path, profile), profile.label or _described(nudges, path)

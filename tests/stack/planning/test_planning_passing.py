@@ -3,7 +3,7 @@
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import Actor, Drive, assert_drivable, car, cone, drive, road, straight_points
+from planned_drives import SHAPE, Actor, Drive, assert_drivable, car, cone, drive, road, straight_points
 
 from dvca_sumo.roadmap import Route
 from dvca_sumo.roadmap.route import PassingLane
@@ -112,3 +112,14 @@ def test_from_a_queue_it_pulls_out_only_where_it_sees_far_enough_back(hides: boo
     ahead = [car(7, 118.0, speed=1.5), car(6, 130.0, speed=1.5), car(8, 130.0, WIDTH, speed=12.0)]
     driven = drive(beside(), 8.0, station=105.0, actors=[*ahead, *behind])
     assert lanes(driven) == expected
+
+
+def test_a_move_to_the_next_lane_ends_where_it_was_to_end_when_it_began() -> None:
+    """From standstill, close behind a queue: a move that grew longer as the ego gets faster would graze its tail."""
+    front = 105.0 + SHAPE.front
+    creeping = [car(7 + number, front + 4.5 + 2.25 + 8.0 * number, speed=0.6) for number in range(12)]
+    driven = drive(beside(), 8.0, station=105.0, actors=creeping)
+    assert driven.clearances.min() > 1.0
+    assert driven.states[:, 2].max() < WIDTH + 0.05
+    assert driven.speeds[-1] > 7.0
+    assert_drivable(driven)
