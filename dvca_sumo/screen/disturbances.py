@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.boxes import contact_times, distances
-from dvca_sumo.messages import Integers, ObjectClass
+from dvca_sumo.messages import Floats, Integers, ObjectClass
 from dvca_sumo.oracles import Places
 from dvca_sumo.oracles.ahead import ahead
 from dvca_sumo.truth import Moment, ObjectsTruth
@@ -96,10 +96,14 @@ class Disturbances:
         velocity = ego.speed * np.array([math.cos(ego.heading), math.sin(ego.heading)])
         touches = contact_times(box, velocity, boxes, objects.velocities[chosen], REACTION) < math.inf
         touching = chosen[touches | (distances(box, boxes) < nearest)].tolist()
+        along = objects.velocities[chosen] @ np.array([math.cos(ego.heading), math.sin(ego.heading)])
+        stopping = [_lengthened(box, way) for way in _way_to_stop(ego.speed, along).tolist()]
+        beside = [
+            row for row, way in zip(chosen, stopping, strict=True) if distances(way, objects.boxes[[row]])[0] == 0.0
+        ]
         found = ahead(self._places, moment, IN_SIGHT, rows=np.sort(chosen))
-        closing = np.maximum(ego.speed - np.maximum(found.speeds, 0.0), 0.0)
-        needed = REACTION * closing + closing * closing / (2.0 * BRAKING)
-        return sorted({*touching, *found.rows[found.gaps < needed].tolist()})
+        in_way = found.rows[found.gaps < _way_to_stop(ego.speed, found.speeds)]
+        return sorted({*touching, *map(int, beside), *in_way.tolist()})
 
     def _walking_in(self, moment: Moment) -> list[int]:
         people = np.flatnonzero(moment.objects.classes == _PERSON)
@@ -109,6 +113,21 @@ class Disturbances:
             distances(self._places.at(moment).box, moment.objects.boxes[people]) <= 0.0
         ].tolist()
         return touching
+
+
+def _way_to_stop(speed: float, others: Floats) -> Floats:
+    """How far an ego at `speed` gets towards `others` (n,), by their speeds along its way, before it has theirs [m]."""
+    closing = np.maximum(speed - np.maximum(others, 0.0), 0.0)
+    way: Floats = REACTION * closing + closing * closing / (2.0 * BRAKING)
+    return way
+
+
+def _lengthened(box: Floats, by: float) -> Floats:
+    """The `box` (5,), its front moved straight on `by` [m]."""
+    longer = box.copy()
+    longer[:2] += 0.5 * by * np.array([math.cos(box[2]), math.sin(box[2])])
+    longer[3] += by
+    return longer
 
 
 def _leaps(now: ObjectsTruth, rows: Integers, before: ObjectsTruth, rows_before: Integers) -> Integers:

@@ -17,6 +17,7 @@ class MotionModelConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
     trend_duration: float = 2.0  # [s] acceleration or braking seen now goes on for so long
     speeding: float = 1.1  # traffic drives up to so many times the limit, or as it does now where that is more
     bend_acceleration: float = 3.0  # [m/s^2] lateral, in bends
+    brisk: float = 1.5  # who is faster in a bend now is so in the next ones too, up to so many times
     braking: float = 2.5  # [m/s^2] for bends and lower limits
     settling_time: float = 3.0  # [s] to the lane's centre
     max_slant: float = 0.3  # [rad] against the lane on the way there: slow objects take longer
@@ -56,7 +57,8 @@ class LaneMotion:
         free = np.minimum(np.maximum(free, np.minimum(squares, finals)), np.maximum(squares, finals))
         slowing = squares - 2.0 * config.braking * metres
         pace = np.maximum(config.speeding, speeds / limits[:, 0])[:, None]
-        caps = np.minimum(bends, pace * limits)
+        briskness = np.clip(speeds / bends[:, 0], 1.0, config.brisk)[:, None]
+        caps = np.minimum(briskness * bends, pace * limits)
         profile = np.maximum(np.sqrt(np.minimum(free, np.maximum(caps * caps, slowing))), _CRAWL)
         times = np.zeros(profile.shape)
         (2.0 / (profile[:, 1:] + profile[:, :-1])).cumsum(axis=1, out=times[:, 1:])

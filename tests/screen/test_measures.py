@@ -133,6 +133,19 @@ def test_a_body_that_jumps_and_drives_into_the_ego_before_anybody_reacts_is_the_
     assert disturbances([turned(0.0, math.pi / 2.0), turned(0.1, -math.pi / 2.0)], roads) == expected
 
 
+def test_a_body_that_turns_on_the_spot_beside_the_nose_swings_its_tail_into_the_way(roads: RoadMap) -> None:
+    """Its nose stays beside the ego's: along the way, it is not ahead."""
+
+    def turned(time: float, heading: float) -> Moment:
+        one = moment(time, 50.0 + 4.4 * time, 4.4, [("car", (0.0, 0.0), 0.0)])
+        nose = np.array([49.5, LANE_Y + 2.4])
+        middle = nose - 2.3 * np.array([math.cos(heading), math.sin(heading)])
+        objects = msgspec.structs.replace(one.objects, boxes=np.array([[*middle, heading, 4.6, 1.8]]))
+        return msgspec.structs.replace(one, objects=objects)
+
+    assert disturbances([turned(0.0, -0.6), turned(0.1, math.pi - 0.5)], roads) == [("car", "jumped")]
+
+
 @pytest.mark.parametrize(("beside", "expected"), [(0.5, [("person:p", "appeared")]), (1.0, [])])
 def test_a_person_who_appears_a_step_beside_the_ego_is_the_simulators_doing(
     roads: RoadMap, beside: float, expected: list[tuple[str, str]]

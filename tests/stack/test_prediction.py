@@ -112,6 +112,13 @@ def test_a_vehicle_in_a_bend_stays_on_its_lane(roadmap: RoadMap) -> None:
     assert result.lanes == (("bend_0",),)
 
 
+def test_who_is_faster_in_a_bend_than_comfort_allows_goes_on_so(roadmap: RoadMap) -> None:
+    x, y, heading = lane_point(roadmap, "bend_0", 205.0)
+    result = predicted(roadmap, Seen(x, y, heading, speed=13.0))
+    stations, _ = roadmap.lanes["bend_0"].line.project(result.poses[0, :, :2])
+    assert stations[12] - stations[0] == pytest.approx(3.0 * 13.0, abs=0.5)
+
+
 def test_both_ends_of_a_bus_follow_its_lane_and_its_middle_cuts_the_bend(roadmap: RoadMap) -> None:
     front, rear = (np.array(lane_point(roadmap, "bend_0", 200.0 + end)[:2]) for end in (6.0, -6.0))
     (x, y), (east, north) = 0.5 * (front + rear), front - rear
