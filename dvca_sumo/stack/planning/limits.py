@@ -18,6 +18,7 @@ _PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
 _PRIORITY = Control.PRIORITY
 _SLOW_FOR_PERSON = (3.0, 6.0)  # [m/s], [m/s per m of gap]
 _SLOW_FOR_OBJECT = (4.0, 10.0)  # [m/s], [m/s per m of gap]
+_STEERED = 4  # [m] of path over which changes of curvature are looked at
 _BESIDE = 3.0  # [m] sideways
 _AT_LINE = 4.0  # [m] before or past it
 _SLOWED = 4.0  # [m/s]
@@ -29,7 +30,7 @@ _SOON_STEP = 15  # of the profile: 3 s
 
 
 def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config: PlanningConfig) -> list[float]:
-    """Highest speed by metre of path [m/s]: limit, curves, passing close by, lines where others may come first.
+    """Highest speed by metre of path [m/s]: limit, curves, how fast the wheels turn, passing close by, lines of others.
 
     Each is braked for in comfort beforehand. Past such a line the ego feels its way until it sees by who waits beside.
     """
@@ -38,6 +39,10 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
         config.cruise_fraction * graph.window.speed_limits[BEHIND:],
         np.sqrt(config.lateral_acceleration / np.maximum(np.abs(path.curvatures), 1e-4)),
     )
+    changes = np.abs(path.curvatures[_STEERED:] - path.curvatures[:-_STEERED])  # of as many metres each
+    turning = config.steering_rate * _STEERED / (shape.wheelbase * np.maximum(changes, 1e-4))
+    middle = slice(_STEERED // 2, _STEERED // 2 + len(turning))
+    caps[middle] = np.minimum(caps[middle], turning)
     for row, cap in _passing_speeds(graph, config):
         low, high = graph.low[row, 0] - shape.front, graph.high[row, 0] + shape.rear_overhang
         if high > 0.0:

@@ -5,7 +5,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import LIMIT, Drive, assert_drivable, curve_points, drive, road, stop_line
+from planned_drives import LIMIT, SHAPE, Drive, assert_drivable, curve_points, drive, road, stop_line
 
 from dvca_sumo.messages import Floats, SignalColour
 from dvca_sumo.roadmap.route import Control, Route
@@ -151,3 +151,14 @@ def test_empty_yield_line_is_passed_slowly_and_without_stopping() -> None:
 def test_priority_road_is_not_slowed_for() -> None:
     driven = drive(road(stop_lines=[stop_line(100.0, Control.PRIORITY, yields_to=frozenset())]), 15.0, speed=13.4)
     assert driven.speeds.min() > 13.0
+
+
+def test_out_of_a_sharp_turn_the_ego_goes_no_faster_than_its_wheels_turn() -> None:
+    """The line turns back and straightens as quickly as one is drawn: 0.05 1/m of curvature more or less a metre."""
+    bends = np.interp(np.arange(0.0, 200.0), [60.0, 63.6, 78.0, 83.0, 86.0, 92.0], [0.0, 0.18, 0.18, -0.07, -0.07, 0.0])
+    headings = np.cumsum(bends)
+    line = np.column_stack((np.cumsum(np.cos(headings)), np.cumsum(np.sin(headings))))
+    driven = drive(road(line), 17.0, station=40.0, speed=5.0)
+    turned = SHAPE.wheelbase * np.abs(driven.states[5:, 6] - driven.states[:-5, 6]) / 0.5
+    assert turned.max() < 0.55
+    assert driven.speeds[-1] > 10.0
