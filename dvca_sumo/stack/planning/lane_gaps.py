@@ -24,6 +24,7 @@ _SLOWEST = 2.0  # [m/s] beside a gap ...
 _FALLING_BACK = 5.0  # [m/s] ... and for one that is yet to come, which the ego does not wait for before it has to
 _WITHIN = 0.3  # of its way to the next lane, the ego's body stays in its own
 _SEEN = 120.0  # [m] before and behind the ego
+_FOLLOWED = 1.0  # [s] after somebody the next one may come
 _PAST = 3.5  # times the distance to who is behind, the next lane is in view past them: by the width of cars on lanes
 _NEAR = 30.0  # [m] of effort, beyond which another place is looked for
 _CATCHES_UP = 0.8  # of the ego's speed: slower ones are come up to ...
@@ -92,7 +93,8 @@ class Gaps:
         """Whether nobody on the lane has to brake more than a little when the ego is there; hurried, at once.
 
         That is where the change can begin, those on the lane keeping their speeds until then; pressed, where
-        the body gets over the marking. Thus it takes up what those who stop for it offer.
+        the body gets over the marking. Thus it takes up what those who stop for it offer. But who passes before that
+        hides others who follow close behind.
         """
         if not lane.tracks:
             return True
@@ -115,6 +117,11 @@ class Gaps:
         closing = np.where(is_ahead, closing, -closing)
         followers = np.where(is_ahead, speed, lane.speeds)
         needed = config.change_gap + headway * followers + np.square(np.maximum(closing, 0.0)) / (2.0 * braking)
+        if is_pressed and is_ahead.all() and lane.fronts[-1] < 0.0:
+            pace = float(lane.speeds[-1])
+            hidden = tail - float(rears[-1]) + _FOLLOWED * pace
+            if hidden < config.change_gap + max(pace - speed, 0.0) ** 2 / (2.0 * braking):
+                return False
         return bool((gaps >= needed).all())
 
     def is_in_sight(self, own: Neighbours, lane: Neighbours, wanted: float, speed: float) -> bool:

@@ -10,6 +10,8 @@ from dvca_sumo.messages import Floats, LocalizationEstimate
 from dvca_sumo.roadmap import Control, Route
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning import Planner, PlanningConfig
+from dvca_sumo.stack.planning.lane_gaps import Gaps, Neighbours
+from dvca_sumo.stack.planning.reference import Reference
 
 WIDTH = 3.2  # [m] of a lane
 START, LATEST = 100.0, 400.0  # [m]
@@ -170,3 +172,23 @@ def test_shortly_before_the_end_of_its_lane_it_takes_a_gap_that_leaves_no_headwa
     assert driven.clearances.min() > 1.0
     assert lane_at(driven, 330.0) == pytest.approx(0.0, abs=0.1)
     assert driven.states[-1, 2] > 0.3 * WIDTH
+
+
+@pytest.mark.parametrize(
+    ("fronts", "is_free"),
+    [
+        ([-7.0, -23.0], False),  # who follows close behind the second one is hidden by it
+        ([-7.0, -23.0, -110.0], True),  # nobody does: the next one is seen
+        ([16.0, 7.0], True),  # they have passed, and hide nobody any more
+    ],
+)
+def test_from_standstill_it_does_not_begin_while_somebody_passes_who_hides_those_behind(
+    fronts: list[float],
+    is_free: bool,  # noqa: FBT001
+) -> None:
+    route, config = crossing_over(), PlanningConfig()
+    window = Reference(route, SHAPE, config).window(390.0, 100.0)
+    places, count = np.array(fronts), len(fronts)
+    lane = Neighbours(places - 4.5, places, np.full(count, 20.0), np.ones(count, dtype=np.bool_), list(range(count)))
+    gaps = Gaps(route.line, SHAPE, config)
+    assert gaps.is_free(lane, route.lane_changes[0], window, 0.0, is_pressed=True) is is_free
