@@ -2,10 +2,10 @@
 
 The rule: a body appears within sight without having come there (it was inserted, or teleported), or one of its ends
 moves farther in one step than its speed allows (a jump; SUMO's lane changes are such jumps, and so are its turns on the
-spot), and at that moment it touches the ego, or will before anybody reacts if both go on as they do, or it is so close
-in the ego's way that full braking after a reaction would not keep the ego off it; a person who appears need only be
-within a step of the ego. Or a person walks into an ego that has stood for a second: SUMO's people walk through
-vehicles. For a while after, violations with that body are the simulator's doing.
+spot), and what is violated with it is so before anybody reacts; or at that moment it touches the ego, or is so close in
+the ego's way that full braking after a reaction would not keep the ego off it; a person who appears need only be within
+a step of the ego. Or a person walks into an ego that has stood for a second: SUMO's people walk through vehicles. Then,
+for a while after, violations with that body are the simulator's doing.
 """
 
 import math
@@ -13,7 +13,7 @@ import math
 import msgspec
 import numpy as np
 
-from dvca_sumo.geometry.boxes import contact_times, distances
+from dvca_sumo.geometry.boxes import distances
 from dvca_sumo.messages import Floats, Integers, ObjectClass
 from dvca_sumo.oracles import Places
 from dvca_sumo.oracles.ahead import ahead
@@ -48,6 +48,7 @@ class Disturbances:
         self._places = places
         self._before: ObjectsTruth | None = None
         self._rows: dict[str, int] = {}  # by name, in the moment before
+        self._sudden: dict[str, Disturbance] = {}  # by name, the last time it appeared or jumped, however far away
         self._drove = -math.inf  # [s] when the ego last moved
 
     def see(self, moment: Moment) -> None:
@@ -66,6 +67,7 @@ class Disturbances:
                 _leaps(objects, now, before, np.array([self._rows[name] for name in common], dtype=np.int64))
             ].tolist()
         for how, candidates in (("appeared", appeared), ("jumped", jumped)):
+            self._sudden.update((names[row], Disturbance(moment.time, names[row], how)) for row in candidates)
             for row in self._too_near(moment, candidates):
                 self.found.append(Disturbance(moment.time, names[row], how))
         if abs(moment.ego.speed) >= _STANDING:
@@ -77,6 +79,9 @@ class Disturbances:
 
     def explain(self, name: str | None, time: float) -> Disturbance | None:
         """The disturbance by that body that a violation at `time` [s] comes from."""
+        sudden = self._sudden.get(name or "")
+        if sudden is not None and 0.0 <= time - sudden.time <= REACTION:
+            return sudden
         return next((one for one in self.found if one.object == name and 0.0 <= time - one.time <= LASTING), None)
 
     def _too_near(self, moment: Moment, rows: list[int]) -> list[int]:
@@ -93,9 +98,7 @@ class Disturbances:
             return []
         nearest = np.where(objects.classes[chosen] == _PERSON, STEP, TOUCHING)
         box, boxes = self._places.at(moment).box, objects.boxes[chosen]
-        velocity = ego.speed * np.array([math.cos(ego.heading), math.sin(ego.heading)])
-        touches = contact_times(box, velocity, boxes, objects.velocities[chosen], REACTION) < math.inf
-        touching = chosen[touches | (distances(box, boxes) < nearest)].tolist()
+        touching = chosen[distances(box, boxes) < nearest].tolist()
         along = objects.velocities[chosen] @ np.array([math.cos(ego.heading), math.sin(ego.heading)])
         stopping = [_lengthened(box, way) for way in _way_to_stop(ego.speed, along).tolist()]
         beside = [

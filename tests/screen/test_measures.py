@@ -117,20 +117,22 @@ def test_a_body_that_turns_on_the_spot_sweeps_over_the_road_at_no_speed_of_its_o
     assert disturbances(slowly, roads) == []
 
 
-@pytest.mark.parametrize(("speed", "expected"), [(6.0, [("car", "jumped")]), (1.0, [])])
-def test_a_body_that_jumps_and_drives_into_the_ego_before_anybody_reacts_is_the_simulators_doing(
-    roads: RoadMap, speed: float, expected: list[tuple[str, str]]
+@pytest.mark.parametrize(("speed", "fault"), [(6.0, Fault.SIMULATOR), (1.0, Fault.OTHER)])
+def test_a_body_that_jumps_and_touches_the_ego_before_anybody_reacts_is_the_simulators_doing(
+    roads: RoadMap, speed: float, fault: Fault
 ) -> None:
     """It turns round on the spot beside the ego, and drives at its flank."""
 
-    def turned(time: float, heading: float) -> Moment:
-        one = moment(time, 50.0, 0.5, [("car", (0.0, 0.0), 0.0)])
-        boxes = np.array([[48.0, LANE_Y + 0.9 + 1.5 + 2.3, heading, 4.6, 1.8]])
-        velocities = speed * np.array([[math.cos(heading), math.sin(heading)]])
-        objects = msgspec.structs.replace(one.objects, boxes=boxes, velocities=velocities)
+    def turned(time: float, heading: float, gap: float) -> Moment:
+        one = moment(time, 50.0 + 0.5 * time, 0.5, [("car", (0.0, 0.0), 0.0)])
+        boxes = np.array([[48.0, LANE_Y + 0.9 + gap + 2.3, heading, 4.6, 1.8]])
+        objects = msgspec.structs.replace(one.objects, boxes=boxes, velocities=np.array([[0.0, -speed]]))
         return msgspec.structs.replace(one, objects=objects)
 
-    assert disturbances([turned(0.0, math.pi / 2.0), turned(0.1, -math.pi / 2.0)], roads) == expected
+    driven = [turned(0.1 * k, -math.pi / 2.0, 1.5 - 0.1 * speed * k) for k in range(1, 17)]
+    touching = next(k for k, one in enumerate(driven) if one.objects.boxes[0, 1] - 2.3 <= LANE_Y + 0.9)
+    moments = [turned(0.0, math.pi / 2.0, 1.5), *driven[: touching + 1]]
+    assert at_contact(moments, roads)[-1] == ("collision", fault)
 
 
 def test_a_body_that_turns_on_the_spot_beside_the_nose_swings_its_tail_into_the_way(roads: RoadMap) -> None:
@@ -199,8 +201,8 @@ def test_a_standing_ego_is_never_at_fault(roads: RoadMap) -> None:
 def test_a_touched_flank_is_the_others_in_the_egos_lane_and_not_on_a_junction(
     roads: RoadMap, front: float, fault: Fault
 ) -> None:
-    where = [(front - 4.0 + 0.5 * k, LANE_Y + 3.0 - 0.35 * k) for k in range(8)]
-    moments = [moment(0.1 * k, front + 0.5 * k, 5.0, [("side", place, 5.0)]) for k, place in enumerate(where)]
+    where = [(front - 7.0 + 0.5 * k, LANE_Y + 5.1 - 0.35 * k) for k in range(14)]
+    moments = [moment(0.1 * k, front - 3.0 + 0.5 * k, 5.0, [("side", place, 5.0)]) for k, place in enumerate(where)]
     touching = next(k for k, (_, y) in enumerate(where) if y - LANE_Y <= 1.8)
     assert at_contact(moments[: touching + 1], roads)[-1] == ("collision", fault)
 
