@@ -66,11 +66,10 @@ class Meetings:
         config = self._config
         entry = float(graph.scene.times[graph.first[row]])
         others_first = self._others_first(row, graph, views)
-        if others_first is False:
-            if self._cuts_in(row, graph):
-                return self._cut_in(row, graph, profile)
-            if self._will_wait(row, entry, graph):
-                return None
+        if others_first is None:
+            return self._cut_in(row, graph, profile)
+        if not others_first and self._will_wait(row, entry, graph):
+            return None
         margin = config.pass_margin_prior
         if others_first:
             margin = config.pass_margin - (config.pass_hold if graph.track(row) in self._passing else 0.0)
@@ -120,19 +119,20 @@ class Meetings:
         after: Flags = np.all((front < graph.low[rows]) | ~graph.occupied[rows], axis=1)
         return after
 
-    def _others_first(self, row: int, graph: Graph, views: list[LineView]) -> bool:
+    def _others_first(self, row: int, graph: Graph, views: list[LineView]) -> bool | None:
         """Whether the other has priority. People have, but before a crossing where they have to wait.
 
-        On junctions the map tells; who leaves its lane has not.
-
-        That is the ego itself where its line has left the lane, in turns that it cannot drive within.
+        On junctions the map tells; elsewhere, who leaves its lane has not. That is the ego itself where its line has
+        left the lane, in turns that it cannot drive within, or the other: None, it cuts in.
         """
         scene = graph.scene
         near, far = (graph.window.station + float(ends[row, graph.first[row]]) for ends in (graph.low, graph.high))
         told = has_priority(views, near, far, scene.lanes[row])
         if scene.classes[scene.owners[row]] == _PERSON:
             return told is not False or len(scene.lanes[row]) < _STILL_TO_CROSS
-        return told if told is not None else self._is_off_lane(graph) or not self._cuts_in(row, graph)
+        if told is not None:
+            return told
+        return True if self._is_off_lane(graph) or not self._cuts_in(row, graph) else None
 
     def _is_off_lane(self, graph: Graph) -> bool:
         window = graph.window

@@ -50,6 +50,15 @@ def test_back_from_a_turn_that_swings_out_the_ego_lets_those_pass_who_drive_wher
         assert bool(driven.speeds[-1] < 0.3) == passes
 
 
+def test_who_comes_onto_the_junction_aslant_and_does_not_wait_is_braked_for_at_once() -> None:
+    """On a roundabout, say: it comes nearly along, and is on the ego's way in less than a second."""
+    line = stop_line(80.0, Control.PRIORITY, yields_to=frozenset(), exit_station=120.0)
+    joining = car(3, 103.0, -6.4, heading=0.9, speed=5.0, lanes=("minor_0",))
+    driven = drive(road(stop_lines=[line]), 1.0, station=93.0, speed=6.3, actors=[joining])
+    assert driven.states[-1, 5] < -1.5
+    assert "yield 3" in driven.decisions
+
+
 def test_leader_that_stops_is_stopped_behind() -> None:
     driven = drive(road(), 30.0, speed=10.0, actors=[car(3, 45.0, speed=9.0, stays_from=8.0)])
     assert driven.speeds[-1] == 0.0
