@@ -102,11 +102,13 @@ class Disturbances:
         along = objects.velocities[chosen] @ np.array([math.cos(ego.heading), math.sin(ego.heading)])
         stopping = [_lengthened(box, way) for way in _way_to_stop(ego.speed, along).tolist()]
         beside = [
-            row for row, way in zip(chosen, stopping, strict=True) if distances(way, objects.boxes[[row]])[0] == 0.0
+            row
+            for row, way in zip(chosen.tolist(), stopping, strict=True)
+            if distances(way, objects.boxes[[row]])[0] == 0.0
         ]
         found = ahead(self._places, moment, IN_SIGHT, rows=np.sort(chosen))
         in_way = found.rows[found.gaps < _way_to_stop(ego.speed, found.speeds)]
-        return sorted({*touching, *map(int, beside), *in_way.tolist()})
+        return sorted({*touching, *beside, *in_way.tolist()})
 
     def _walking_in(self, moment: Moment) -> list[int]:
         people = np.flatnonzero(moment.objects.classes == _PERSON)

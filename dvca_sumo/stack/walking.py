@@ -22,12 +22,13 @@ class WalkingConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     at_crossing: float = 1.0  # [m] from its entry
 
 
-class _Crossing(NamedTuple):
-    """Somebody's way to a crossing."""
+class _Crossings(NamedTuple):
+    """Ways of people to crossings (h,)."""
 
-    row: int
-    ground: str
-    way: Way
+    rows: Integers  # of those who go
+    lanes: list[tuple[str, ...]]  # the ground they are on, and the crossing
+    entries: Floats  # (h, 2) [m] where they come to it, straight across if they are abreast of it
+    across: Floats  # (h, 2) its direction
 
 
 class Walking:
@@ -48,69 +49,58 @@ class Walking:
         places = self._walkways.under(points)
         ways = speeds * _HORIZON
         kept = [(row, place) for row, place in enumerate(places) if isinstance(place, Ground)]
-        on = np.array([row for row, _ in kept], dtype=np.int64)
         crossings = self._crossings(points, velocities, speeds, kept)
         if kept:
-            grounds = [ground for _, ground in kept]
+            on, grounds = np.array([row for row, _ in kept]), [ground for _, ground in kept]
             rooms = room(points[on], velocities[on] / speeds[on, None], ways[on], grounds)
-            crosses = np.zeros(len(rows), dtype=np.bool_)
-            crosses[[crossing.row for crossing in crossings]] = True
-            stays = (rooms < ways[on]) & (crosses[on] | (rooms > speeds[on] * self._config.stepping_off))
+            crosses = np.isin(on, crossings.rows)
+            stays = (rooms < ways[on]) & (crosses | (rooms > speeds[on] * self._config.stepping_off))
             ways[on[stays]] = np.maximum(rooms[stays] - self._config.kerb_room, 0.0)
         lanes = [() if place is None else (place if isinstance(place, str) else place.lane,) for place in places]
-        owners = np.concatenate((np.arange(len(rows)), [crossing.row for crossing in crossings])).astype(np.int64)
+        owners = np.concatenate((np.arange(len(rows)), crossings.rows))
         counts = np.bincount(owners, minlength=len(rows))
         walked = np.minimum(speeds[:, None] * PREDICTION_TIMES, ways[:, None])
         poses = np.empty((len(owners), len(PREDICTION_TIMES), 3))
         poses[:] = tracked.boxes[rows[owners], None, :3]
         poses[: len(rows), :, :2] += walked[:, :, None] * (velocities / speeds[:, None])[:, None]
-        if crossings:
-            poses[len(rows) :, :, :2] = _crossed(points, speeds, crossings)
-        return Hypotheses(
-            rows[owners],
-            1.0 / counts[owners],
-            poses,
-            [*lanes, *((crossing.ground, crossing.way.lane) for crossing in crossings)],
-        )
+        poses[len(rows) :, :, :2] = _crossed(points[crossings.rows], speeds[crossings.rows], crossings)
+        return Hypotheses(rows[owners], 1.0 / counts[owners], poses, [*lanes, *crossings.lanes])
 
     def _crossings(
         self, points: Floats, velocities: Floats, speeds: Floats, kept: list[tuple[int, Ground]]
-    ) -> list[_Crossing]:
+    ) -> _Crossings:
         """Those that people on pavements may be about to use."""
-        found = [_Crossing(row, ground.lane, way) for row, ground in kept for way in ground.ways]
+        found = [(row, ground.lane, way) for row, ground in kept for way in ground.ways]
         if not found:
-            return []
-        config, rows = self._config, [crossing.row for crossing in found]
-        gaps = _entries(points, found) - points[rows]
+            return _Crossings(np.empty(0, dtype=np.int64), [], np.empty((0, 2)), np.empty((0, 2)))
+        config, rows = self._config, np.array([row for row, _, _ in found])
+        entries, across = _entries(points[rows], [way for _, _, way in found])
+        gaps, own, velocities = entries - points[rows], speeds[rows], velocities[rows]
         distances = np.hypot(gaps[:, 0], gaps[:, 1])
-        level = np.cos(config.crossing_angle) * distances * speeds[rows]
-        towards = np.einsum("ij,ij->i", gaps, velocities[rows]) > level
-        across = np.array([crossing.way.direction for crossing in found])
-        towards |= (distances < config.at_crossing) & (np.einsum("ij,ij->i", across, velocities[rows]) > 0.0)
-        towards &= distances < config.crossing_outlook * speeds[rows]
-        return [crossing for crossing, is_towards in zip(found, towards.tolist(), strict=True) if is_towards]
+        towards = np.einsum("ij,ij->i", gaps, velocities) > np.cos(config.crossing_angle) * distances * own
+        towards |= (distances < config.at_crossing) & (np.einsum("ij,ij->i", across, velocities) > 0.0)
+        used = (towards & (distances < config.crossing_outlook * own)).nonzero()[0]
+        lanes: list[tuple[str, ...]] = [(found[one][1], found[one][2].lane) for one in used.tolist()]
+        return _Crossings(rows[used], lanes, entries[used], across[used])
 
 
-def _entries(points: Floats, crossings: list[_Crossing]) -> Floats:
-    """Where people at `points` come to their crossings, straight across if they are abreast of them (h, 2) [m]."""
-    middles = np.array([crossing.way.entry for crossing in crossings])
-    across = np.array([crossing.way.direction for crossing in crossings])
-    half_widths = np.array([crossing.way.half_width for crossing in crossings])
-    gaps = points[[crossing.row for crossing in crossings]] - middles
+def _entries(points: Floats, ways: list[Way]) -> tuple[Floats, Floats]:
+    """Where people at `points` come to a crossing each, and its direction: (h, 2) each."""
+    middles = np.array([way.entry for way in ways])
+    across = np.array([way.direction for way in ways])
+    half_widths = np.array([way.half_width for way in ways])
+    gaps = points - middles
     beside = np.clip(across[:, 0] * gaps[:, 1] - across[:, 1] * gaps[:, 0], -half_widths, half_widths)
-    entries: Floats = middles + beside[:, None] * np.stack((-across[:, 1], across[:, 0]), axis=1)
-    return entries
+    return middles + beside[:, None] * np.stack((-across[:, 1], across[:, 0]), axis=1), across
 
 
-def _crossed(points: Floats, speeds: Floats, crossings: list[_Crossing]) -> Floats:
-    """Straight to the crossing, then across it: (h, t, 2) [m]."""
-    rows = [crossing.row for crossing in crossings]
-    starts, entries = points[rows], _entries(points, crossings)
-    across = np.array([crossing.way.direction for crossing in crossings])
-    gaps = entries - starts
+def _crossed(starts: Floats, speeds: Floats, crossings: _Crossings) -> Floats:
+    """From `starts` (h, 2) straight to the crossing, then across it: (h, t, 2) [m]."""
+    gaps = crossings.entries - starts
     distances = np.hypot(gaps[:, 0], gaps[:, 1])[:, None]
-    walked = speeds[rows, None] * PREDICTION_TIMES
+    walked = speeds[:, None] * PREDICTION_TIMES
     shares = np.minimum(walked / np.maximum(distances, 1e-6), 1.0)
     beyond = np.maximum(walked - distances, 0.0)
-    crossed: Floats = starts[:, None] + shares[:, :, None] * gaps[:, None] + beyond[:, :, None] * across[:, None]
+    crossed: Floats = starts[:, None] + shares[:, :, None] * gaps[:, None]
+    crossed += beyond[:, :, None] * crossings.across[:, None]
     return crossed

@@ -116,12 +116,11 @@ class Gaps:
         gaps = np.where(is_ahead, rears - nose, tail - fronts)
         closing = np.where(is_ahead, closing, -closing)
         followers = np.where(is_ahead, speed, lane.speeds)
-        needed = config.change_gap + headway * followers + np.square(np.maximum(closing, 0.0)) / (2.0 * braking)
         if is_pressed and is_ahead.all() and lane.fronts[-1] < 0.0:
-            pace = float(lane.speeds[-1])
-            hidden = tail - float(rears[-1]) + _FOLLOWED * pace
-            if hidden < config.change_gap + max(pace - speed, 0.0) ** 2 / (2.0 * braking):
-                return False
+            pace = lane.speeds[-1]
+            gaps = np.append(gaps, tail - rears[-1] + _FOLLOWED * pace)
+            followers, closing = np.append(followers, pace), np.append(closing, pace - speed)
+        needed = config.change_gap + headway * followers + _braked(closing, braking)
         return bool((gaps >= needed).all())
 
     def is_in_sight(self, own: Neighbours, lane: Neighbours, wanted: float, speed: float) -> bool:
@@ -132,11 +131,10 @@ class Gaps:
         """
         config, shape = self._config, self._shape
         pace = float(lane.speeds[lane.is_traffic].max()) if lane.is_traffic.any() else wanted
-        closing = max(pace - speed, 0.0)
-        needed = config.change_gap + config.change_headway * pace + closing * closing / (2.0 * config.change_braking)
+        needed = config.change_gap + config.change_headway * pace + _braked(pace - speed, config.change_braking)
         nearest = float(own.fronts[own.fronts < 0.0].max(initial=-_SEEN))
         sight = min(_PAST * (shape.centre - nearest), _SEEN) - 0.5 * shape.length
-        return closing == 0.0 or sight >= needed
+        return bool(pace <= speed or sight >= needed)
 
     def pace(self, lane: Neighbours, change: LaneChange, window: Window, speed: float) -> float:
         """The speed that brings the ego behind the nearest one on the lane who has room behind [m/s].
@@ -171,3 +169,9 @@ class Gaps:
         efforts = np.where(shifts > 0.0, np.where(is_faster, _FORWARD, 1.0) * shifts, -shifts)
         row = int(np.where(is_in_reach, efforts, np.inf).argmin())
         return _Slot(float(efforts[row]), float(shifts[row]), float(lane.speeds[row]))
+
+
+def _braked(closing: Floats | float, braking: float) -> Floats:
+    """The way on which `braking` takes off a speed, if there is one to take off [m]."""
+    way: Floats = np.square(np.maximum(closing, 0.0)) / (2.0 * braking)
+    return way

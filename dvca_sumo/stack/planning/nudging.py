@@ -205,14 +205,12 @@ class NudgeDecider:
         is_committed = blocker.track not in self._since or situation.lateral.offset / offset > _COMMITTED
         if blocker.track in self._held and is_committed:
             return True
-        kind = situation.scene.classes[blocker.row]
+        kind, stood = situation.scene.classes[blocker.row], situation.time - self._since[blocker.track]
         if kind == _PERSON and self._is_near_line(blocker.high, situation.views):
             has_stopped = bool(self._held) or situation.speed < self._config.standing_speed
-            stood = situation.time - self._since.get(blocker.track, situation.time)
             if not has_stopped or stood < self._config.person_patience:
                 return False  # who waits at a crossing will go
         if kind != _STATIC:
-            stood = situation.time - self._since[blocker.track]
             patience = self._config.broken_down_after if self._is_in_traffic(blocker, situation) else 0.0
             if stood < max(self._config.parked_after, patience) or self._is_queueing(blocker, situation):
                 return False

@@ -72,10 +72,12 @@ class Passing:
         if target != self._lane:
             is_pressed = self._lane != self._target or is_last_chance(stop, speed)
             is_begun = goes_on(float(aside[self._lane]), way.widths[self._lane], occupied[target], shape)
-            is_free = self._gaps.is_free(occupied[target], way, window, speed, is_pressed=is_pressed)
-            if is_free and target == _BESIDE != self._target:
-                is_free = self._gaps.is_in_sight(occupied[_OWN], occupied[_BESIDE], wanted, speed)
-            if not is_begun and not is_free:
+            is_pulling_out = target == _BESIDE != self._target
+            may_begin = is_begun or (
+                self._gaps.is_free(occupied[target], way, window, speed, is_pressed=is_pressed)
+                and (not is_pulling_out or self._gaps.is_in_sight(occupied[_OWN], occupied[_BESIDE], wanted, speed))
+            )
+            if not may_begin:
                 target = self._lane
         pace = math.inf
         if target != wish and (is_late or is_queue):

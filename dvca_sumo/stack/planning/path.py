@@ -40,6 +40,11 @@ class Lateral(NamedTuple):
     slope: float
     bend: float  # [1/m]
 
+    @property
+    def unsettled(self) -> float:
+        """How far it is from rest on the line, a slope of 1 counting for 4 m of offset [m]."""
+        return abs(self.offset) + 4.0 * abs(self.slope)
+
 
 _CENTRED = Lateral(0.0, 0.0, 0.0)
 
@@ -152,7 +157,7 @@ def _blends(
     """
     blends: list[tuple[float, float, float]] = []
     position, offset, state = 0.0, lateral.offset, lateral
-    unsettled = abs(lateral.offset) + 4.0 * abs(lateral.slope)
+    unsettled = lateral.unsettled
     for plateau in plateaus:
         length = blend_length(max(abs(plateau.offset - offset), unsettled), speed, config)
         back = blend_length(max(abs(offset), unsettled), speed, config)

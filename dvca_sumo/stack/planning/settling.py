@@ -4,7 +4,6 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length
 
 _LEAP = 0.5  # [m] from one cycle to the next: the line is that of another lane
-_STEEP = 4.0  # [m] of offset that a slope of 1 counts for
 
 
 class Settling:
@@ -18,8 +17,7 @@ class Settling:
     def step(self, lateral: Lateral, station: float, speed: float) -> list[Plateau]:
         """Where the ego, `lateral` to the line of this cycle at the route's `station` [m], has to be on it; or none."""
         if abs(lateral.offset - self._offset) > _LEAP:
-            way = abs(lateral.offset) + _STEEP * abs(lateral.slope)
-            self._end = station + blend_length(way, speed, self._config)
+            self._end = station + blend_length(lateral.unsettled, speed, self._config)
         self._offset = lateral.offset
         if self._end is None or self._end <= station:
             self._end = None
