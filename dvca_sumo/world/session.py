@@ -16,6 +16,7 @@ from typing import Any
 import libsumo
 import msgspec
 import numpy as np
+import shapely
 import traci.constants as tc
 
 from dvca_sumo.messages import ObjectClass, SignalColour
@@ -23,6 +24,7 @@ from dvca_sumo.scenario import Scenario, ScenarioError, input_words
 from dvca_sumo.truth import EgoTruth, ObjectsTruth
 from dvca_sumo.world.crowd import Body, Crowd
 from dvca_sumo.world.entry import Entry
+from dvca_sumo.world.inset import Inset
 from dvca_sumo.world.itinerary import Itinerary
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 from dvca_sumo.world.setback import Setback
@@ -57,6 +59,16 @@ class Motion(msgspec.Struct, frozen=True):
     edges: tuple[str, ...]  # of its present route
 
 
+class _Adopted(msgspec.Struct):
+    """What SUMO is told of an ego, and why."""
+
+    itinerary: Itinerary
+    setback: Setback
+    inset: Inset
+    width: float  # [m]
+    length: float  # [m] of lane that it takes up
+
+
 class Session:
     """A running SUMO simulation; `close` ends it."""
 
@@ -78,9 +90,8 @@ class Session:
             raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {_in_one_line(error)}") from None
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
-        self._itineraries: dict[str, Itinerary] = {}  # by ego
-        self._setbacks: dict[str, Setback] = {}  # by ego
-        self._lengths: dict[str, float] = {}  # [m] by ego, that SUMO was told
+        self._adopted: dict[str, _Adopted] = {}  # by ego
+        self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
 
     @property
@@ -183,9 +194,8 @@ class Session:
         of.setWidth(entry.ego, entry.width)
         of.setVehicleClass(entry.ego, entry.vehicle_class)
         of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
-        self._itineraries[entry.ego] = Itinerary(entry.edges, of.getRouteID(entry.ego))
-        self._setbacks[entry.ego] = Setback()
-        self._lengths[entry.ego] = entry.length
+        itinerary = Itinerary(entry.edges, of.getRouteID(entry.ego))
+        self._adopted[entry.ego] = _Adopted(itinerary, Setback(), Inset(), entry.width, entry.length)
         self._vehicle(entry.ego)  # the length it has, before SUMO is told what it takes up
         self.watch(entry.ego, radius)
 
@@ -206,7 +216,7 @@ class Session:
 
     def remove(self, vehicle: str) -> None:
         """Take a vehicle out of the simulation."""
-        del self._crowds[vehicle], self._itineraries[vehicle], self._setbacks[vehicle], self._lengths[vehicle]
+        del self._crowds[vehicle], self._adopted[vehicle]
         of = libsumo.vehicle
         for kind in (tc.CMD_GET_VEHICLE_VARIABLE, tc.CMD_GET_PERSON_VARIABLE):
             of.unsubscribeContext(vehicle, kind, 0.0)  # else SUMO gives up at the next step
@@ -224,12 +234,15 @@ class Session:
         """
         edge, _, index = lane.rpartition("_")
         found = libsumo.vehicle.getLaneID(ego)
-        ahead = front - self._setbacks[ego].at(truth.x, truth.y, truth.speed, is_on_lane=bool(found))
+        adopted = self._adopted[ego]
+        ahead = front - adopted.setback.at(truth.x, truth.y, truth.speed, is_on_lane=bool(found))
         x = truth.x + ahead * math.cos(truth.heading)
         y = truth.y + ahead * math.sin(truth.heading)
+        middle, width = self._middle(lane)
+        x, y = adopted.inset.at(x, y, middle, 0.5 * (width + adopted.width), is_on_lane=bool(found))
         angle = 90.0 - math.degrees(truth.heading)
-        self._itineraries[ego].reach(edge)
-        if found and libsumo.vehicle.getRouteID(ego) != self._itineraries[ego].route:
+        adopted.itinerary.reach(edge)
+        if found and libsumo.vehicle.getRouteID(ego) != adopted.itinerary.route:
             self._remind(ego, found)
         libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, angle, keepRoute=2, matchThreshold=_MATCHED_WITHIN)
         # SUMO derives a wrong speed on junction and opposite lanes; drivers behind must react to the true one.
@@ -239,8 +252,9 @@ class Session:
 
     def stretch(self, ego: str, length: float) -> None:
         """Tell SUMO how much lane an ego takes up [m]: its drivers stop that far behind its front."""
-        if abs(length - self._lengths[ego]) > _TOLD_ANEW:
-            self._lengths[ego] = length
+        adopted = self._adopted[ego]
+        if abs(length - adopted.length) > _TOLD_ANEW:
+            adopted.length = length
             libsumo.vehicle.setLength(ego, length)
 
     def objects(self, ego: str) -> ObjectsTruth:
@@ -296,11 +310,19 @@ class Session:
         """End the simulation; the process may start another."""
         libsumo.close()
 
+    def _middle(self, lane: str) -> tuple[shapely.LineString, float]:
+        """A lane's centre line and width [m]."""
+        if lane not in self._middles:
+            shape = libsumo.lane.getShape(lane)
+            line = shapely.LineString([shape[0], *shape])  # of two points at least, however short the lane
+            self._middles[lane] = line, libsumo.lane.getWidth(lane)
+        return self._middles[lane]
+
     def _remind(self, ego: str, lane: str) -> None:
         """Tell SUMO the rest of an ego's trip again, as soon as it sees it, on `lane`, on the way."""
         of, row = libsumo.vehicle, libsumo.vehicle.getRouteIndex(ego)
         is_between = lane.startswith(":")
-        itinerary = self._itineraries[ego]
+        itinerary = self._adopted[ego].itinerary
         onward = itinerary.onward(of.getRoute(ego)[row : row + 1 + is_between])
         if onward:
             of.setRoute(ego, onward)
