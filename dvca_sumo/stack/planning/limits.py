@@ -8,10 +8,11 @@ from dvca_sumo.messages import ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Control
 from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.exits import ahead, is_blocked
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.reference import BEHIND
 from dvca_sumo.stack.planning.scene import ALONG
-from dvca_sumo.stack.planning.speed import Leader, Stop, slowed_before
+from dvca_sumo.stack.planning.speed import Stop, slowed_before
 from dvca_sumo.stack.planning.st_graph import Graph
 
 _PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
@@ -25,8 +26,6 @@ _SLOWED = 4.0  # [m/s]
 _SLOW_MOVER = 3.0  # [m/s] faster ones are not passed slowly
 _GIVE_AT_DESTINATION = 1.0  # [m]
 _GIVE_AT_OBJECT = 1.0  # [m] of the distance to it is never spent
-_TIMID = 1.0  # [m/s] a leader slower than this, now and in `_SOON_STEP`, may stop on the junction's exit
-_SOON_STEP = 15  # of the profile: 3 s
 
 
 def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config: PlanningConfig) -> list[float]:
@@ -76,37 +75,28 @@ def _hiding(graph: Graph, line: float) -> float:
 
 def nearest_stop(
     to_destination: float,
+    speed: float,
     graph: Graph,
     views: list[LineView],
-    leader: Leader | None,
     shape: VehicleShape,
     config: PlanningConfig,
 ) -> Stop:
     """The first place where the ego has to stop whatever others do: destination, line, object, occupied exit.
 
-    `to_destination` counts from the front bumper [m].
+    `to_destination` counts from the front bumper [m]; `speed` is the ego's [m/s].
     """
     stops = [Stop(to_destination, _GIVE_AT_DESTINATION, "stop destination")]
     stops += [_at_line(view.distance, view.stop, config) for view in views if view.stop]
-    occupied_from = blocked_from = math.inf
     obstacle = _obstacle(graph, shape, config)
     if obstacle is not None:
-        occupied_from = float(graph.low[obstacle, 0]) - shape.front
-        if graph.scene.classes[graph.scene.owners[obstacle]] != _VEHICLE:
-            blocked_from = occupied_from
         label = f"stop behind {graph.track(obstacle)}"
         gap = -config.object_gap if config.stops_past_objects else config.object_gap
+        occupied_from = float(graph.low[obstacle, 0]) - shape.front
         stops.append(Stop(occupied_from - gap, config.object_gap - _GIVE_AT_OBJECT, label))
-    if leader is not None and max(leader.speeds[0], leader.speeds[_SOON_STEP]) < _TIMID:
-        occupied_from = min(occupied_from, leader.rears[0])
-    for line, distance, _, _ in views:
-        if not line.crosses or distance <= 0.0:
-            continue
-        leave = distance + line.exit_station - line.station
-        is_exit_occupied = 0.0 < occupied_from - leave < shape.length + config.follow_gap
-        # Behind vehicles the ego may wait on the junction: they go on.
-        if is_exit_occupied or distance < blocked_from <= leave:
-            stops.append(_at_line(distance, "stop exit occupied", config))
+    if views:
+        those = ahead(graph, shape)
+        blocked = [view.distance for view in views if is_blocked(view, those, speed, shape, config)]
+        stops += [_at_line(distance, "stop exit occupied", config) for distance in blocked]
     return min(stops, key=lambda stop: stop.at)
 
 

@@ -141,7 +141,7 @@ class Planner:
             others = [row for row in others if graph.track(row) not in choice.behind]
         leader = leader_of(leaders, graph, shape)
         to_destination = self._destination - graph.window.station - shape.front
-        stops = [nearest_stop(to_destination, graph, views, leader, shape, config)]
+        stops = [nearest_stop(to_destination, start.speed, graph, views, shape, config)]
         if choice.keeping is not None:
             stops.append(choice.keeping.stop)
         if choice.pace < math.inf:

@@ -407,6 +407,17 @@ def test_junction_is_not_entered_while_its_exit_is_occupied() -> None:
     assert far.fronts[-1] - SHAPE.length > 112.0
 
 
+def test_junction_is_not_entered_behind_who_takes_the_room_that_is_left_beyond_it() -> None:
+    line = stop_line(100.0, Control.PRIORITY, yields_to=frozenset())
+    tail = car(3, 126.0)
+    alone = drive(road(stop_lines=[line]), 20.0, speed=10.0, actors=[tail])
+    assert alone.fronts[-1] - SHAPE.length > 112.0
+    leader = car(4, 85.0, speed=5.0, stays_from=(119.5 - 85.0) / 5.0)
+    behind = drive(road(stop_lines=[line]), 20.0, speed=5.0, station=60.0, actors=[tail, leader])
+    assert behind.speeds[-1] == 0.0
+    assert 98.0 < behind.fronts[-1] < 100.0
+
+
 def test_unlikely_future_is_ignored_and_a_likely_one_is_not() -> None:
     crossing = predicted([person(3, 60.0, -6.0, heading=UP, speed=1.4)], 0.0)
     decisions = {}

@@ -1,0 +1,61 @@
+"""Junctions that are kept clear: the ego enters one where it finds room behind the queue beyond."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, ObjectClass, VehicleShape
+from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.junctions import LineView
+from dvca_sumo.stack.planning.scene import Flags
+from dvca_sumo.stack.planning.st_graph import Graph
+
+_PERSON = int(ObjectClass.PEDESTRIAN)
+_SOON = int(np.searchsorted(PREDICTION_TIMES, 3.0))
+_CREEPS = 3.0  # [m] within 3 s: who gets no further, and is no faster now, may stop for good
+_BRAKING = 4.0  # [m/s^2] is as much as is braked for it
+_QUEUED = 2.0  # [m] that those who close up leave to each other
+
+
+class Ahead(NamedTuple):
+    """Who is on the path at present; places are from the ego's front bumper on [m]."""
+
+    rears: Floats  # (n,)
+    fronts: Floats  # (n,)
+    stands: Flags  # (n,) or creeps
+    is_vehicle: Flags  # (n,)
+
+
+def ahead(graph: Graph, shape: VehicleShape) -> Ahead:
+    """Those whom the path meets where they are now: each by the slowest of its futures."""
+    scene = graph.scene
+    rows = graph.occupied[:, 0].nonzero()[0]
+    ways = graph.low[rows, _SOON] - graph.low[rows, 0]
+    rows = rows[np.argsort(ways, kind="stable")]
+    owners, firsts = np.unique(scene.owners[rows], return_index=True)
+    rows = rows[firsts]
+    low, high = graph.low[rows], graph.high[rows, 0]
+    stands = (rows >= scene.moving) | (low[:, _SOON] - low[:, 0] < _CREEPS)
+    return Ahead(low[:, 0] - shape.front, high - shape.front, stands, scene.classes[owners] != _PERSON)
+
+
+def is_blocked(view: LineView, those: Ahead, speed: float, shape: VehicleShape, config: PlanningConfig) -> bool:
+    """Whether the ego, at `speed` [m/s], is to wait at a line it has not passed for the junction behind it to clear.
+
+    It is when one of `those` stands on the junction who is no vehicle: vehicles there go on. And when it would not fit
+    between the junction and the first one who stands beyond it, after all who drive there before the ego have
+    closed up. It is not any more where it could hardly stop.
+    """
+    line, distance = view.line, view.distance
+    if not line.crosses or distance <= 0.0 or speed * speed > 2.0 * _BRAKING * distance:
+        return False
+    leave = distance + line.exit_station - line.station
+    if (those.stands & ~those.is_vehicle & (those.rears > distance) & (those.rears <= leave)).any():
+        return True
+    beyond = those.stands & (those.rears > leave)
+    if not beyond.any():
+        return False
+    tail = float(those.rears[beyond].min())
+    before = those.is_vehicle & (those.fronts > distance) & (those.rears < tail)
+    taken = float((those.fronts - those.rears + _QUEUED)[before].sum())
+    return tail - leave - taken < shape.length + config.follow_gap
