@@ -18,7 +18,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     cruise_fraction: float = 0.97  # of the speed limit: room for what control overshoots
     acceleration: float = 2.0  # [m/s^2] comfort
     braking: float = 1.2  # [m/s^2] b of the intelligent driver model: stops then take about twice that
-    slowing: float = 1.5  # [m/s^2] before curves and lower limits
+    slowing: float = 2.0  # [m/s^2] before curves and lower limits
     comfort_braking: float = 2.5  # [m/s^2] not exceeded unless there is no other way
     hard_braking: float = 7.5  # [m/s^2] what dry asphalt allows with something in reserve
     jerk: float = 4.0  # [m/s^3] comfort
