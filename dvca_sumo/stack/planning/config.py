@@ -24,6 +24,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     jerk: float = 4.0  # [m/s^3] comfort
     hard_jerk: float = 20.0  # [m/s^3] when braking harder than comfort
     lateral_acceleration: float = 2.5  # [m/s^2] in curves
+    steering: float = 0.5  # [rad] of the front wheels, going round something in a bend
     steering_rate: float = 0.45  # [rad/s] of the front wheels, on the way into a curve and out of it
     shift_acceleration: float = 1.2  # [m/s^2] when moving sideways
     hard_shift_acceleration: float = 2.5  # [m/s^2] when there is no room for comfort

@@ -1,5 +1,6 @@
 """The path decision: around what stands in the way, on which side and by how much, or not at all."""
 
+import math
 from collections.abc import Container
 
 import msgspec
@@ -173,10 +174,11 @@ class NudgeDecider:
         return None
 
     def _candidates(self, blocker: _Blocker, window: Window, span: slice) -> list[float]:
-        """At most one offset to the left and one to the right, with the wanted clearance or what the road allows."""
+        """At most one offset to the left and one to the right: the wanted clearance, or what road and wheels allow."""
         edge, least = self._config.edge_clearance, self._config.nudge_clearance_least
-        leftmost = max(float((window.road_left - window.swept_left)[span].min()) - edge, 0.0)
-        rightmost = min(float((window.road_right - window.swept_right)[span].max()) + edge, 0.0)
+        inward_left, inward_right = self._steerable(window.curvatures[span])
+        leftmost = max(min(float((window.road_left - window.swept_left)[span].min()) - edge, inward_left), 0.0)
+        rightmost = min(max(float((window.road_right - window.swept_right)[span].max()) + edge, inward_right), 0.0)
         touches_left, touches_right = blocker.left - blocker.swept_right, blocker.right - blocker.swept_left
         left = min(max(touches_left + blocker.wanted, 0.0), leftmost)
         right = max(min(touches_right - blocker.wanted, 0.0), rightmost)
@@ -186,6 +188,15 @@ class NudgeDecider:
         if touches_right - right >= least:
             offsets.append(right)
         return offsets
+
+    def _steerable(self, curvatures: Floats) -> tuple[float, float]:
+        """How far into bends of the line the wheels turn the ego, to the left and to the right [m]."""
+        tightest = self._shape.wheelbase / math.tan(self._config.steering)
+        left, right = float(curvatures.max(initial=0.0)), float(curvatures.min(initial=0.0))
+        return (
+            1.0 / left - tightest if left > 0.0 else math.inf,
+            1.0 / right + tightest if right < 0.0 else -math.inf,
+        )
 
     def _clears(self, blocker: _Blocker, offset: float) -> bool:
         return blocker.clearance(offset) >= self._config.nudge_clearance_least

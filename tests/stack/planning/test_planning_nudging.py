@@ -238,3 +238,16 @@ def test_who_starts_when_the_ego_is_about_to_pass_is_passed_or_followed_without_
     assert driven.clearances.min() > 0.4
     assert driven.states[:, 5].min() > -4.0
     assert_drivable(driven)
+
+
+@pytest.mark.parametrize(("radius", "decision"), [(16.0, "nudge left 5"), (6.5, "stop behind 5")])
+def test_what_stands_in_a_bend_is_passed_on_its_inner_side_where_the_wheels_turn_so_far(
+    radius: float, decision: str
+) -> None:
+    points = curve_points(radius, before=40.0)
+    middle = points[40 + round(5.0 + math.pi / 4.0 * radius)]
+    driven = drive(road(points, lanes_left=1), 25.0, speed=5.0, actors=[cone(5, *middle)])
+    assert decision in driven.decisions
+    passes = driven.states[-1, 2] > middle[1] + 20.0
+    assert passes == ("nudge left 5" in driven.decisions)
+    assert driven.clearances.min() >= 0.4
