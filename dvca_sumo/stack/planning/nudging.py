@@ -11,9 +11,9 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length, feasible_length
 from dvca_sumo.stack.planning.reference import BEHIND, Window
-from dvca_sumo.stack.planning.scene import IN_LANE, Flags, Scene
+from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags, Scene
 
-_PERSON, _STATIC = int(ObjectClass.PEDESTRIAN), int(ObjectClass.STATIC)
+_VEHICLE, _PERSON, _STATIC = (int(kind) for kind in (ObjectClass.VEHICLE, ObjectClass.PEDESTRIAN, ObjectClass.STATIC))
 _SEEN_LATE = 20.0  # [m] before the end of the window, objects are not yet decided about
 _ALONG = 1.0  # [m] kept lengthwise around an object before the ego moves back
 _OVER_LINE = 0.1  # [m] over the lane marking is not yet another lane
@@ -21,6 +21,7 @@ _COMMITTED = 0.5  # of the offset: from there on it is safer to go on than to go
 _SLOWEST = 3.0  # [m/s] assumed of the ego when it passes
 _DRIVING = 1.0  # [s] of moving: what is seen first may seem to move for less
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane
+_PARALLEL = 0.95  # cosine of the smallest angle (18 degrees) to the line at which somebody stands aslant
 _CLOSING = 2.0  # [s] of closing speed kept to those who come from behind
 
 
@@ -163,8 +164,9 @@ class NudgeDecider:
         lane_right = float((window.lane_right - window.swept_right)[span].max()) - _OVER_LINE
         held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
         offsets = self._candidates(blocker, window, span)
+        turns_in = self._turns_in(blocker, situation)
         for offset in sorted(offsets, key=lambda offset: (offset * held <= 0.0, abs(offset))):
-            stays_in_lane = offset == 0.0 or lane_right <= offset <= lane_left
+            stays_in_lane = offset == 0.0 or (lane_right <= offset <= lane_left and not turns_in)
             if self._meets_another(blocker, offset, situation.scene) or not (
                 stays_in_lane or self._may_leave_lane(blocker, offset, situation)
             ):
@@ -234,11 +236,21 @@ class NudgeDecider:
 
         Near a junction anyone may; farther away, who was seen driving.
         """
+        if self._turns_in(blocker, situation):
+            return True
         if abs(float(situation.scene.now.offsets[blocker.row])) >= IN_LANE:
             return False
         to_lines = [view.distance + self._shape.front - blocker.high for view in situation.views]
         is_near = any(0.0 < distance < self._config.queue_length for distance in to_lines)
         return is_near or blocker.track in self._driven
+
+    def _turns_in(self, blocker: _Blocker, situation: Situation) -> bool:
+        """Whether a vehicle stands aslant in our way at a junction: it drives on into our lane as soon as it can."""
+        scene, row = situation.scene, blocker.row
+        if scene.classes[row] != _VEHICLE or blocker.clearance(0.0) >= self._config.object_margin:
+            return False
+        is_aslant = ALONG < float(scene.now.directions[row]) < _PARALLEL
+        return is_aslant and self._is_near_line(blocker.high, situation.views)
 
     def _is_queueing(self, blocker: _Blocker, situation: Situation) -> bool:
         """A vehicle in our lane may just wait, however long it has stood: near a line, or behind one that waits."""

@@ -251,3 +251,14 @@ def test_what_stands_in_a_bend_is_passed_on_its_inner_side_where_the_wheels_turn
     passes = driven.states[-1, 2] > middle[1] + 20.0
     assert passes == ("nudge left 5" in driven.decisions)
     assert driven.clearances.min() >= 0.4
+
+
+@pytest.mark.parametrize(("heading", "y", "decision"), [(0.0, -1.6, "nudge left 5"), (0.6, -2.8, "stop behind 5")])
+def test_who_stands_aslant_at_a_junction_comes_into_the_lane_and_is_not_passed_within_it(
+    heading: float, y: float, decision: str
+) -> None:
+    junction = stop_line(90.0, Control.PRIORITY, yields_to=frozenset(), exit_station=120.0)
+    standing = car(5, 105.0, y, heading=heading, size=(4.5, 1.0))
+    driven = drive(road(stop_lines=[junction]), 40.0, speed=10.0, actors=[standing])
+    assert decision in driven.decisions
+    assert (driven.fronts[-1] > 120.0) == (decision == "nudge left 5")
