@@ -59,7 +59,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     standing_speed: float = 0.5  # [m/s] slower than this is standing: above the noise of a tracker
     moving_speed: float = 1.0  # [m/s] a vehicle that has stood counts as moving from here: the noise is on both sides
     parked_after: float = 3.0  # [s] of standing before the ego leaves its lane for a vehicle or person
-    person_patience: float = 8.0  # [s] of standing at a crossing, before the ego leaves its lane for a person
+    person_patience: float = 4.0  # [s] of standing at a crossing, before the ego leaves its lane for a person
     broken_down_after: float = 120.0  # [s] of standing in the lane, if it may be in a queue
     queue_reach: float = 30.0  # [m] before a stop line, a vehicle that stands may be waiting
     queue_length: float = 100.0  # [m] before a stop line, a vehicle that stands may be behind others that it hides
