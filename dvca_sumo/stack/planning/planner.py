@@ -28,6 +28,7 @@ from dvca_sumo.stack.planning.scene import scene_in
 from dvca_sumo.stack.planning.settling import Settling
 from dvca_sumo.stack.planning.speed import Profile, Stop, roll_out
 from dvca_sumo.stack.planning.st_graph import Graph, graph_of, leader_of, leading
+from dvca_sumo.stack.planning.standing import Standing
 from dvca_sumo.stack.planning.start import StartState, start_state
 
 _HORIZON = float(TRAJECTORY_TIMES[-1])  # [s]
@@ -52,6 +53,7 @@ class Planner:
         self._passing = Passing(route, shape, config)
         self._nudging = NudgeDecider(shape, config)
         self._settling = Settling(config)
+        self._standing = Standing()
         self._meetings = Meetings(shape, config)
         self._previous: Trajectory | None = None
         self._station: float | None = None  # of the start state of the last cycle
@@ -104,6 +106,7 @@ class Planner:
         signals: dict[str, SignalColour],
     ) -> tuple[Floats, str]:
         station, offset = located
+        predicted = self._standing.settled(predicted, self._nudging.stood)
         config, shape = self._config, self._shape
         window = self._reference.window(station, self._reach(station, start.speed))
         choice = self._passing.step(window, offset, start.speed, predicted.objects)

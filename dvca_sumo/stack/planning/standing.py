@@ -1,0 +1,35 @@
+"""Where people stand. By noise each cycle sees them elsewhere, and the ego would creep past on the luckiest."""
+
+from collections.abc import Container
+
+import msgspec
+import numpy as np
+
+from dvca_sumo.messages import Floats, ObjectClass, PredictedObjects
+
+_PERSON = int(ObjectClass.PEDESTRIAN)
+_NEW = 0.1  # weight of what is seen now: the mean is over about two seconds
+
+
+class Standing:
+    """Remembers the mean place of each person who stands (exponential smoothing)."""
+
+    def __init__(self) -> None:
+        self._places: dict[int, Floats] = {}  # [m] by track
+
+    def settled(self, predicted: PredictedObjects, stood: Container[int]) -> PredictedObjects:
+        """The same with those people where they are on average who `stood`, as tracks, in the last cycle."""
+        objects = predicted.objects
+        people = np.flatnonzero(objects.classes == _PERSON).tolist()
+        rows = [row for row in people if objects.ids[row] in stood]
+        tracks: list[int] = objects.ids[rows].tolist()
+        if not rows:
+            self._places = {}
+            return predicted
+        seen = objects.boxes[rows, :2]
+        known = np.array([self._places.get(track, place) for track, place in zip(tracks, seen, strict=True)])
+        places = known + _NEW * (seen - known)
+        self._places = dict(zip(tracks, places, strict=True))
+        boxes = objects.boxes.copy()
+        boxes[rows, :2] = places
+        return msgspec.structs.replace(predicted, objects=msgspec.structs.replace(objects, boxes=boxes))

@@ -1,0 +1,33 @@
+"""People who stand are where they are on average, not where the noise of one cycle puts them."""
+
+import msgspec
+import numpy as np
+from planned_drives import car, person, predicted
+
+from dvca_sumo.messages import PredictedObjects
+from dvca_sumo.stack.planning.standing import Standing
+
+
+def shifted(seen: PredictedObjects, shift: float) -> PredictedObjects:
+    boxes = seen.objects.boxes.copy()
+    boxes[:, 1] += shift
+    return msgspec.structs.replace(seen, objects=msgspec.structs.replace(seen.objects, boxes=boxes))
+
+
+def test_noise_of_who_stands_averages_out_and_that_of_others_stays() -> None:
+    rng = np.random.default_rng(4)
+    standing, seen = Standing(), predicted([person(3, 20.0, 1.0), person(4, 30.0, 2.0), car(5, 40.0, 3.0)], 0.0)
+    noise = rng.normal(0.0, 0.1, 200)
+    settled = np.array([standing.settled(shifted(seen, shift), {3, 5}).objects.boxes[:, 1] for shift in noise])
+    spread = settled[50:].std(axis=0)
+    assert spread[0] < 0.3 * noise.std()
+    assert abs(settled[50:, 0].mean() - 1.0) < 0.02
+    assert np.array_equal(settled[:, 1:], np.array([[2.0, 3.0]]) + noise[:, None])
+
+
+def test_who_has_walked_on_is_where_it_is_seen_and_stands_anew_there() -> None:
+    standing = Standing()
+    standing.settled(predicted([person(3, 20.0, 1.0)], 0.0), {3})
+    elsewhere = predicted([person(3, 25.0, 1.0)], 0.0)
+    assert standing.settled(elsewhere, set()) is elsewhere
+    assert standing.settled(elsewhere, {3}).objects.boxes[0, 0] == 25.0
