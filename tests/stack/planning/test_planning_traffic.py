@@ -418,6 +418,14 @@ def test_junction_is_not_entered_behind_who_takes_the_room_that_is_left_beyond_i
     assert 98.0 < behind.fronts[-1] < 100.0
 
 
+def test_who_is_too_near_a_line_to_stop_at_it_goes_on_to_the_occupied_exit() -> None:
+    line = stop_line(100.0, Control.PRIORITY, yields_to=frozenset())
+    driven = drive(road(stop_lines=[line]), 12.0, speed=9.0, station=92.0, actors=[car(3, 118.0)])
+    assert driven.speeds[-1] == 0.0
+    assert driven.fronts[-1] > 108.0
+    assert driven.states[:, 5].min() > -4.0
+
+
 def test_unlikely_future_is_ignored_and_a_likely_one_is_not() -> None:
     crossing = predicted([person(3, 60.0, -6.0, heading=UP, speed=1.4)], 0.0)
     decisions = {}
