@@ -30,13 +30,12 @@ def ahead(graph: Graph, shape: VehicleShape) -> Ahead:
     """Those whom the path meets where they are now: each by the slowest of its futures."""
     scene = graph.scene
     rows = graph.occupied[:, 0].nonzero()[0]
-    ways = graph.low[rows, _SOON] - graph.low[rows, 0]
-    rows = rows[np.argsort(ways, kind="stable")]
-    owners, firsts = np.unique(scene.owners[rows], return_index=True)
-    rows = rows[firsts]
-    low, high = graph.low[rows], graph.high[rows, 0]
-    stands = (rows >= scene.moving) | (low[:, _SOON] - low[:, 0] < _CREEPS)
-    return Ahead(low[:, 0] - shape.front, high - shape.front, stands, scene.classes[owners] != _PERSON)
+    ways = np.where(rows < scene.moving, graph.low[rows, _SOON] - graph.low[rows, 0], -np.inf)
+    slowest = np.argsort(ways, kind="stable")
+    owners, firsts = np.unique(scene.owners[rows[slowest]], return_index=True)
+    chosen = slowest[firsts]
+    rears, fronts = graph.low[rows[chosen], 0] - shape.front, graph.high[rows[chosen], 0] - shape.front
+    return Ahead(rears, fronts, ways[chosen] < _CREEPS, scene.classes[owners] != _PERSON)
 
 
 def is_blocked(view: LineView, those: Ahead, speed: float, shape: VehicleShape, config: PlanningConfig) -> bool:
