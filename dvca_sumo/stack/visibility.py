@@ -6,11 +6,12 @@ a body either hides what is behind it or, when it is too narrow, hides nothing.
 
 import numpy as np
 
+from dvca_sumo.geometry.angles import wrapped_all
 from dvca_sumo.messages import Floats
 
 RAYS = 8  # cast per box, evenly over the angle it fills; the sensor resolves shares of 1/8
 
-_RAY_SHARES = (np.arange(RAYS) + 0.5) / RAYS
+_RAY_SHARES = (np.arange(RAYS) + 0.5) / RAYS - 0.5  # from the middle of the angle
 _SIDES = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]]).T[:, None, :] / 2.0  # of the four corners
 
 
@@ -31,41 +32,45 @@ def visible_shares(boxes: Floats, occluder_width: float) -> Floats:
     what is behind it, not what stands in front of its far end.
     """
     count = len(boxes)
-    occluders = (np.minimum(boxes[:, 3], boxes[:, 4]) >= occluder_width).nonzero()[0]
-    if count < 2 or occluders.size == 0:
+    hides = np.minimum(boxes[:, 3], boxes[:, 4]) >= occluder_width
+    if count < 2 or not hides.any():
         return np.ones(count)
-    entries = _entries(boxes, _ray_bearings(boxes).ravel())
-    rays = np.arange(count * RAYS)
-    own = entries[rays // RAYS, rays]
-    nearest = entries[occluders].min(axis=0)
+    middles, halves = _angles(boxes)
+    apart = np.abs(middles[:, None] - middles)
+    overlap = np.minimum(apart, 2.0 * np.pi - apart) <= halves[:, None] + halves
+    overlap &= hides
+    np.fill_diagonal(overlap, val=True)
+    seen, hiding = overlap.nonzero()
+    entries = _entries(boxes[hiding], (middles[:, None] + 2.0 * halves[:, None] * _RAY_SHARES)[seen])
+    own = entries[seen == hiding]
+    nearest = np.minimum.reduceat(entries, seen.searchsorted(np.arange(count)))
     # A box is never hidden by itself; an origin inside it has no entry point, and it is seen.
     unhidden = (own <= nearest + 1e-9) | np.isinf(own)
-    shares: Floats = unhidden.reshape(count, RAYS).sum(axis=1) / RAYS
+    shares: Floats = unhidden.sum(axis=1) / RAYS
     return shares
 
 
-def _ray_bearings(boxes: Floats) -> Floats:
-    """Bearings of each box's rays [rad], (n, RAYS), strictly inside the angle it fills."""
+def _angles(boxes: Floats) -> tuple[Floats, Floats]:
+    """The angle each box fills [rad]: bearing of its middle, in [-pi, pi], and half of it."""
     half_length, half_width = boxes[:, 3, None] * _SIDES[0], boxes[:, 4, None] * _SIDES[1]
     cos, sin = np.cos(boxes[:, 2, None]), np.sin(boxes[:, 2, None])
     x, y = boxes[:, 0, None], boxes[:, 1, None]
     corner_x = x + cos * half_length - sin * half_width
     corner_y = y + sin * half_length + cos * half_width
     offsets = np.arctan2(x * corner_y - y * corner_x, x * corner_x + y * corner_y)  # from the bearing of the centre
-    low, high = offsets.min(axis=1, keepdims=True), offsets.max(axis=1, keepdims=True)
-    bearings: Floats = np.arctan2(y, x) + low + (high - low) * _RAY_SHARES
-    return bearings
+    low, high = offsets.min(axis=1), offsets.max(axis=1)
+    return wrapped_all(np.arctan2(boxes[:, 1], boxes[:, 0]) + 0.5 * (low + high)), 0.5 * (high - low)
 
 
 def _entries(boxes: Floats, bearings: Floats) -> Floats:
-    """Distance at which the ray of each bearing enters each box [m], inf where it misses or starts inside.
+    """Distance at which rays enter their boxes [m], inf where they miss or start inside.
 
     Args:
-        boxes: (m, 5).
-        bearings: (r,) [rad].
+        boxes: (p, 5).
+        bearings: (p, r) [rad], of the rays cast at each box.
 
     Returns:
-        (m, r).
+        (p, r).
     """
     ray_x, ray_y = np.cos(bearings), np.sin(bearings)
     cos, sin = np.cos(boxes[:, 2, None]), np.sin(boxes[:, 2, None])
@@ -79,7 +84,7 @@ def _entries(boxes: Floats, bearings: Floats) -> Floats:
 
 
 def _slab(slopes: Floats, centres: Floats, sizes: Floats) -> tuple[Floats, Floats]:
-    """Where rays enter and leave strips: (m, r) slopes to the strips' normals, (m,) centres and sizes."""
+    """Where rays enter and leave strips: (p, r) slopes to the strips' normals, (p,) centres and sizes."""
     slopes[slopes == 0.0] = 1e-12  # parallel: the strip is crossed far away or never
     inverse = 1.0 / slopes
     middle = centres[:, None] * inverse
