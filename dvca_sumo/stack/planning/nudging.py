@@ -156,6 +156,7 @@ class NudgeDecider:
     def _offset(self, blocker: _Blocker, situation: Situation) -> float | None:
         """The offset to pass at: on the side of the last cycle if that still works, else the smaller one.
 
+        While the lane is not to be left for what will not move, the room that it leaves will do if it is enough.
         None where there is no way round, or where none is needed.
         """
         window = situation.window
@@ -164,15 +165,20 @@ class NudgeDecider:
         lane_right = float((window.lane_right - window.swept_right)[span].max()) - _OVER_LINE
         held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
         offsets = self._candidates(blocker, window, span)
+        has_left = not lane_right <= held <= lane_left
         turns_in = self._turns_in(blocker, situation)
         for offset in sorted(offsets, key=lambda offset: (offset * held <= 0.0, abs(offset))):
             stays_in_lane = offset == 0.0 or (lane_right <= offset <= lane_left and not turns_in)
             if self._meets_another(blocker, offset, situation.scene) or not (
-                stays_in_lane or self._may_leave_lane(blocker, offset, situation)
+                stays_in_lane or self._may_leave_lane(blocker, offset, situation, has_left=has_left)
             ):
                 continue
             is_same = abs(offset - held) < self._config.nudge_hold and self._clears(blocker, held)
             return (held if is_same else offset) or None
+        if lane_right <= lane_left and not turns_in and self._will_stay(blocker, situation):
+            for offset in (min(max(offset, lane_right), lane_left) for offset in offsets):
+                if self._clears(blocker, offset) and not self._meets_another(blocker, offset, situation.scene):
+                    return offset or None
         return None
 
     def _candidates(self, blocker: _Blocker, window: Window, span: slice) -> list[float]:
@@ -213,23 +219,33 @@ class NudgeDecider:
         gaps = now.gaps(np.asarray(offset + blocker.swept_left), np.asarray(offset + blocker.swept_right))
         return bool((alongside & (gaps < self._config.nudge_clearance_least - 1e-6)).any())
 
-    def _may_leave_lane(self, blocker: _Blocker, offset: float, situation: Situation) -> bool:
+    def _may_leave_lane(self, blocker: _Blocker, offset: float, situation: Situation, *, has_left: bool) -> bool:
         """For what will not move by itself, when the other lane is free; always to finish what was begun."""
-        is_committed = blocker.track not in self._since or situation.lateral.offset / offset > _COMMITTED
-        if blocker.track in self._held and is_committed:
+        if has_left and (blocker.track not in self._since or situation.lateral.offset / offset > _COMMITTED):
             return True
-        kind, stood = situation.scene.classes[blocker.row], situation.time - self._since[blocker.track]
-        if kind == _PERSON and self._is_near_line(blocker.high, situation.views):
-            has_stopped = bool(self._held) or situation.speed < self._config.standing_speed
-            if not has_stopped or stood < self._config.person_patience:
-                return False  # who waits at a crossing will go
-        if kind != _STATIC:
-            patience = self._config.broken_down_after if self._is_in_traffic(blocker, situation) else 0.0
-            if stood < max(self._config.parked_after, patience) or self._is_queueing(blocker, situation):
-                return False
+        if not self._will_stay(blocker, situation):
+            return False
         length = blend_length(offset, situation.speed, self._config)
         band = (blocker.low - self._shape.front - length, blocker.high + length)
         return self._is_free(offset, band, situation.speed, situation.scene)
+
+    def _will_stay(self, blocker: _Blocker, situation: Situation) -> bool:
+        """Whether it has stood for so long, where it is, that it will not move by itself."""
+        if blocker.track not in self._since:
+            return False
+        kind, stood = situation.scene.classes[blocker.row], situation.time - self._since[blocker.track]
+        if kind == _STATIC:
+            return True
+        patience = self._config.parked_after
+        if kind == _PERSON:
+            if self._is_near_line(blocker.high, situation.views):  # who waits at a crossing will go
+                patience = max(patience, self._config.person_patience)
+                if not self._held and situation.speed >= self._config.standing_speed:
+                    return False
+            return stood >= patience
+        if self._is_in_traffic(blocker, situation):
+            patience = max(patience, self._config.broken_down_after)
+        return stood >= patience and not self._is_queueing(blocker, situation)
 
     def _is_in_traffic(self, blocker: _Blocker, situation: Situation) -> bool:
         """Who stands in the middle of our lane may be in a queue that it hides.

@@ -109,6 +109,22 @@ def test_lane_is_not_left_for_a_person_who_waits_by_a_crossing_unless_they_do_fo
     assert apart.fronts[-1] > 150.0
 
 
+def test_person_who_stands_in_the_lane_by_a_crossing_is_no_queue() -> None:
+    route = road(lanes_left=1, stop_lines=[stop_line(120.0, Control.PRIORITY, yields_to=frozenset())])
+    driven = drive(route, 40.0, speed=10.0, actors=[person(5, 117.0, -1.0)])
+    assert driven.speeds[driven.fronts < 116.0].min() < 0.5
+    assert driven.clearances.min() > 0.35
+    assert driven.fronts[-1] > 135.0
+
+
+def test_person_is_passed_within_the_lane_where_the_next_one_is_not_free() -> None:
+    oncoming = [car(10 + i, 200.0 + 12.0 * i, 3.2, heading=math.pi, speed=8.0) for i in range(40)]
+    driven = drive(road(lanes_left=1), 30.0, speed=8.0, actors=[person(5, 117.0, -1.2), *oncoming])
+    assert driven.fronts[-1] > 130.0
+    assert driven.states[:, 2].max() < 0.85
+    assert driven.clearances.min() > 0.35
+
+
 def test_ego_that_stands_close_to_a_person_beside_its_way_drives_on() -> None:
     driven = drive(road(), 15.0, station=20.0, actors=[person(5, 24.6, -1.62)])
     assert driven.clearances.min() > 0.35
