@@ -21,6 +21,7 @@ from dvca_sumo.stack.planning.lane_changing import LaneChanger, LaneChoice
 from dvca_sumo.stack.planning.limits import nearest_stop, speed_caps
 from dvca_sumo.stack.planning.meeting import Demand, Meetings
 from dvca_sumo.stack.planning.nudging import Nudge, NudgeDecider, Situation
+from dvca_sumo.stack.planning.oncoming import waits
 from dvca_sumo.stack.planning.passing import Passing
 from dvca_sumo.stack.planning.path import Path, lateral_start, path_along
 from dvca_sumo.stack.planning.reference import BEHIND, Reference
@@ -150,6 +151,10 @@ class Planner:
         if choice.pace < math.inf:
             caps = [min(cap, choice.pace) for cap in caps]
         profile = roll_out(start.speed, start.acceleration, caps, stops, leader, config)
+        waiting = waits(graph, views, profile, shape, config)
+        if waiting:
+            stops += waiting
+            profile = roll_out(start.speed, start.acceleration, caps, stops, leader, config)
         demands: dict[int, Demand] = {}
         for _ in range(_ROUNDS):
             undecided = [row for row in others if row not in demands]

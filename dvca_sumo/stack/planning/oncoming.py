@@ -1,0 +1,95 @@
+"""Who comes towards the ego where its body cannot keep to its lane: it waits before that stretch, not on it."""
+
+import math
+
+import numpy as np
+
+from dvca_sumo.messages import Floats, VehicleShape
+from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.junctions import LineView
+from dvca_sumo.stack.planning.reference import BEHIND
+from dvca_sumo.stack.planning.scene import ALONG, Flags
+from dvca_sumo.stack.planning.speed import STEP_TIMES, Profile, Stop
+from dvca_sumo.stack.planning.st_graph import Graph
+
+_RECENT = 4  # last times of a future, over which its speed is taken
+_COMES = 0.5  # [m/s] slower ones are not expected to get there
+_CREEPS = 1.0  # [m/s] of the ego beyond the end of its profile, at least
+_HARD_GAP = 0.5  # [m] to the stretch, defended by hard braking
+
+
+def waits(
+    graph: Graph, views: list[LineView], profile: Profile, shape: VehicleShape, config: PlanningConfig
+) -> list[Stop]:
+    """Places to wait for those whom an ego that drives `profile` would meet on a stretch beyond its lane's edge.
+
+    They are looked for farther than they are predicted, at the speed they have then. What is begun is gone on with. On
+    junctions the rules of meeting hold.
+    """
+    left, right = _beyond_lane(graph, views)
+    if left.max() <= 0.0 and right.max() <= 0.0:
+        return []
+    scene, begun = graph.scene, slice(0, int(shape.front) + 1)
+    comes = (scene.futures.directions[: scene.moving, [0, -1]] < -ALONG).any(axis=1)
+    found = []
+    for row in comes.nonzero()[0].tolist():
+        spare, is_left = _spare(row, graph)
+        meets = (left if is_left else right) > max(spare - config.object_margin, 0.0)
+        if meets[begun].any() or not meets.any():
+            continue
+        begin, end = _first(meets, shape.length + config.yield_gap)
+        nose, tail = float(graph.path.arcs[begin]) - shape.front, float(graph.path.arcs[end]) + shape.rear_overhang
+        arrives, leaves = _passage(graph.low[row], graph.high[row], scene.times, nose + shape.front, tail)
+        free = leaves + config.clear_margin
+        if arrives < _time(profile, tail) + config.pass_margin and _time(profile, nose) < free:
+            give = config.yield_gap - _HARD_GAP
+            found.append(Stop(nose - config.yield_gap, give, f"yield {graph.track(row)}", free))
+    return found
+
+
+def _beyond_lane(graph: Graph, views: list[LineView]) -> tuple[Floats, Floats]:
+    """How far the body on its path is beyond the left and the right edge of its lane, by metre ahead [m]."""
+    window, path = graph.window, graph.path
+    left, right = path.left - window.lane_left, window.lane_right - path.right
+    for line, _, _, _ in views:
+        junction = window.span(line.station - window.station, line.exit_station - window.station)
+        left[junction] = right[junction] = -math.inf
+    return left[BEHIND:], right[BEHIND:]
+
+
+def _spare(row: int, graph: Graph) -> tuple[float, bool]:
+    """How far beyond the lane's edge who comes, as future `row` has it, stays in the end [m]; whether on the left."""
+    futures, window = graph.scene.futures, graph.window
+    ahead = (futures.stations[row] > 0.0).nonzero()[0]
+    column = int(ahead[-1]) if ahead.size else 0
+    place = int(window.index(futures.stations[row, column : column + 1])[0])
+    offset = float(futures.offsets[row, column])
+    edge = window.lane_left[place] if offset > 0.0 else -window.lane_right[place]
+    return abs(offset) - float(futures.half_widths[row, column]) - float(edge), offset > 0.0
+
+
+def _first(meets: Flags, bridged: float) -> tuple[int, int]:
+    """The first stretch of `meets`, with what follows it so closely that there is no room to wait in between [m]."""
+    rows = meets.nonzero()[0]
+    breaks = (np.diff(rows) > bridged).nonzero()[0]
+    return int(rows[0]), int(rows[breaks[0]] if breaks.size else rows[-1])
+
+
+def _passage(low: Floats, high: Floats, times: Floats, begin: float, end: float) -> tuple[float, float]:
+    """When who comes is on the stretch from `begin` to `end` [m]: from, until [s]; inf for never."""
+    pace = float(low[-1 - _RECENT] - low[-1]) / float(times[-1] - times[-1 - _RECENT])
+
+    def reached(nearest: Floats, place: float) -> float:
+        there = (nearest <= place).nonzero()[0]
+        if there.size:
+            return float(times[there[0]])
+        return float(times[-1] + (nearest[-1] - place) / pace) if pace > _COMES else math.inf
+
+    return reached(low, end), reached(high, begin)
+
+
+def _time(profile: Profile, arc: float) -> float:
+    """When the ego is at `arc` [s]; after the end of its profile at the speed it has then, or creeping."""
+    if arc > profile.arcs[-1]:
+        return float(STEP_TIMES[-1]) + (arc - float(profile.arcs[-1])) / max(float(profile.speeds[-1]), _CREEPS)
+    return float(STEP_TIMES[int(np.searchsorted(profile.arcs, arc))])

@@ -1,0 +1,52 @@
+"""Who comes towards the ego where its way leads beyond its lane."""
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+from planned_drives import Drive, car, drive, road
+
+from dvca_sumo.roadmap.route import Route
+
+
+def swerving(side: float) -> Route:
+    """A straight lane, and a line that leaves it by 1.6 m to one side from 90 m to 145 m."""
+    x = np.arange(0.0, 600.0)
+    out, back = np.clip((x - 90.0) / 15.0, 0.0, 1.0), np.clip((x - 130.0) / 15.0, 0.0, 1.0)
+    y = 0.8 * side * (np.cos(math.pi * back) - np.cos(math.pi * out))
+    route = road(np.column_stack((x, y)))
+    across = route.line.points[:, 1]
+    return msgspec.structs.replace(
+        route, lane_left=1.6 - across, lane_right=-1.6 - across, road_left=1.6 - across, road_right=-1.6 - across
+    )
+
+
+def meeting(x: float, speed: float, *, side: float = 1.0, beside: float = 3.2, cars: int = 1) -> Drive:
+    others = [car(5 + index, x + 20.0 * index, side * beside, heading=math.pi, speed=speed) for index in range(cars)]
+    return drive(swerving(side), 40.0, speed=8.0, actors=others)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("x", "speed"), [(220.0, 6.0), (240.0, 9.0), (260.0, 9.0), (300.0, 12.0)])
+def test_ego_waits_before_it_leaves_its_lane_for_who_comes_towards_it(x: float, speed: float, side: float) -> None:
+    driven = meeting(x, speed, side=side)
+    assert driven.clearances.min() > 0.5
+    assert driven.fronts[-1] > 250.0
+
+
+def test_all_who_come_one_behind_the_other_are_waited_for() -> None:
+    driven = meeting(260.0, 9.0, cars=3)
+    assert driven.clearances.min() > 0.5
+    assert driven.fronts[-1] > 200.0
+
+
+def test_who_comes_only_after_the_ego_is_back_in_its_lane_is_not_waited_for() -> None:
+    driven = meeting(340.0, 9.0)
+    assert driven.speeds.min() > 7.0
+
+
+def test_who_comes_far_enough_to_the_side_is_not_waited_for() -> None:
+    driven = meeting(260.0, 9.0, beside=4.6)
+    assert driven.speeds.min() > 5.0
+    assert driven.clearances.min() > 0.5
