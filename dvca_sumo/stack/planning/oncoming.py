@@ -30,7 +30,8 @@ def waits(
     if left.max() <= 0.0 and right.max() <= 0.0:
         return []
     scene, begun = graph.scene, slice(0, int(shape.front) + 1)
-    comes: Flags = (scene.futures.directions[: scene.moving, [0, -1]] < -ALONG).any(axis=1)
+    directions = scene.futures.directions[: scene.moving]
+    comes: Flags = (directions[:, 0] < -ALONG) | (directions[:, -1] < -ALONG)
     found = []
     for row in comes.nonzero()[0].tolist():
         spare, is_left = _spare(row, graph)
