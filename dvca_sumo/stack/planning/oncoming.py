@@ -35,8 +35,9 @@ def waits(
     found = []
     for row in comes.nonzero()[0].tolist():
         spare, is_left = _spare(row, graph)
-        meets = (left if is_left else right) > max(spare - config.object_margin, 0.0)
-        if meets[begun].any() or not meets.any():
+        beyond = left if is_left else right
+        meets = beyond > max(spare - config.object_margin, 0.0)
+        if not meets.any() or (beyond[begun] > max(spare, 0.0)).any():
             continue
         begin, end = _first(meets, shape.length + config.yield_gap)
         nose, tail = float(graph.path.arcs[begin]) - shape.front, float(graph.path.arcs[end]) + shape.rear_overhang
