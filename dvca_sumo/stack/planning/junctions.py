@@ -93,6 +93,8 @@ class Junctions:
         needed = speed * speed / (2.0 * max(distance, 0.1))
         if colour is SignalColour.YELLOW and needed > self._config.yellow_braking:
             self._entered.add(index)
+        elif distance > 0.0 and needed < self._config.comfort_braking:
+            self._entered.discard(index)  # somebody else has made it slow down
         if colour is SignalColour.RED and speed > _ROLLING:
             needed = speed * speed / (2.0 * max(distance + _OVERRUN, 0.1))
             if needed > self._config.hard_braking:
