@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from planned_drives import (
     SHAPE,
+    Actor,
+    Drive,
     assert_drivable,
     believed,
     car,
@@ -134,6 +136,15 @@ def test_person_standing_at_the_kerb_is_passed_slowly() -> None:
 def test_person_walking_along_the_road_is_just_passed() -> None:
     driven = drive(road(), 15.0, speed=13.0, actors=[person(3, 80.0, -3.5, speed=1.4)])
     assert driven.speeds.min() > 12.5
+
+
+@pytest.mark.parametrize(("speed", "leaves"), [(2.5, 0.9), (3.0, 0.6), (3.5, 0.6)])
+def test_slow_ego_stops_for_a_person_who_walks_off_beside_its_front_corner(speed: float, leaves: float) -> None:
+    beside = person(3, 23.0 + SHAPE.front, -2.3, heading=UP, speed=1.4, leaves=leaves)
+    driven = drive(road(), 8.0, station=20.0, speed=speed, actors=[beside])
+    touched = driven.clearances <= 0.0
+    assert driven.speeds[touched].max(initial=0.0) < 1.0
+    assert driven.fronts[-1] > 30.0
 
 
 @pytest.mark.parametrize("x", [103.0, 103.4, 104.2])
@@ -373,6 +384,20 @@ def test_ego_that_is_slow_on_the_junction_at_red_lets_the_others_go(lane: str) -
     assert driven.fronts[0] > 22.5
     assert driven.clearances.min() > 1.0
     assert driven.fronts[-1] > 60.0
+
+
+def test_who_was_late_for_yellow_and_then_has_to_stop_before_the_line_waits_there() -> None:
+    def signals(time: float) -> dict[str, SignalColour]:
+        return {"J/2": SignalColour.GREEN if time < 6.8 else SignalColour.YELLOW if time < 8.0 else SignalColour.RED}
+
+    def driven(*actors: Actor) -> Drive:
+        route = road(stop_lines=[stop_line(120.0, Control.SIGNAL)])
+        return drive(route, 25.0, speed=13.0, actors=actors, signals=signals)
+
+    assert driven().fronts[-1] > 200.0
+    stopped = driven(person(5, 116.0, -3.0, heading=UP, speed=1.4, leaves=6.8))
+    assert stopped.fronts[-1] < 120.0
+    assert stopped.clearances.min() > 0.2
 
 
 def test_junction_is_not_entered_while_a_person_stands_in_the_way_on_it() -> None:
