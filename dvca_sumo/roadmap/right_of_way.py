@@ -20,8 +20,8 @@ _AROUND = 10.0  # [m] before and behind a junction a crossing may still touch th
 _SAMPLE = 0.1  # [m]
 
 
-def stop_line(net: NetContents, movement: Movement, station: float, exit_station: float) -> StopLine:
-    """The stop line before `movement`, which the route drives between two stations [m]."""
+def stop_line(net: NetContents, movement: Movement, line: Polyline, station: float, exit_station: float) -> StopLine:
+    """The stop line before `movement`, which the route drives between two stations of its `line` [m]."""
     junction = net.junctions[movement.junction]
     x, y = net.lanes[movement.from_lane].line.points[-1]
     control = Control.SIGNAL if movement.signal_id else _CONTROLS.get(movement.state, Control.PRIORITY)
@@ -36,7 +36,19 @@ def stop_line(net: NetContents, movement: Movement, station: float, exit_station
         exit_station=exit_station,
         stop_signs=_stop_signs(net, movement) if control in STOP_SIGNS else (),
         direction=movement.direction,
+        waiting_station=_waiting_station(net, movement, line, station, exit_station),
     )
+
+
+def _waiting_station(
+    net: NetContents, movement: Movement, line: Polyline, station: float, exit_station: float
+) -> float | None:
+    """The end of its first lane on the junction, where the net has it go on by another one."""
+    if len(movement.internal) < 2:
+        return None
+    end = net.lanes[movement.internal[0]].line.points[-1]
+    stations, _ = line.project(end[None], between=(station, exit_station))
+    return float(stations[0])
 
 
 def _stop_signs(net: NetContents, movement: Movement) -> tuple[Approach, ...]:

@@ -44,6 +44,7 @@ class StopLine(msgspec.Struct, frozen=True, eq=False):
     exit_station: float  # [m] where the route leaves the junction
     stop_signs: tuple[Approach, ...] = ()  # others of conflicting movements, with STOP and ALL_WAY_STOP
     direction: str = "s"  # of the movement, as `Movement` has it
+    waiting_station: float | None = None  # [m] on the junction, where those wait who let the oncoming traffic pass
 
 
 class Crossing(msgspec.Struct, frozen=True, eq=False):

@@ -83,7 +83,7 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
         road_right=road_right,
         start=departure,
         destination=destination,
-        stop_lines=tuple(stop_line(net, p.movement, p.begin, p.end) for p in passages),
+        stop_lines=tuple(stop_line(net, p.movement, line, p.begin, p.end) for p in passages),
         crossings=crossed,
         unmapped_limits=tuple(
             UnmappedLimit(float(line.stations[rows.start]), float(line.stations[rows.stop - 1]), lane.is_motorway)

@@ -115,6 +115,18 @@ def test_signal_is_named_and_keeps_the_priorities_of_permissive_green(plain: Net
     assert straight.yields_to == frozenset()
 
 
+def test_left_turn_waits_on_the_junction_before_the_way_of_the_oncoming_traffic(plain: NetBuilder) -> None:
+    roadmap = tee(plain, "traffic_light")
+    route = roadmap.route(["ex", "xs"], "ex_0", 10.0, None, 100.0)
+    line = route.stop_lines[0]
+    assert line.waiting_station is not None
+    assert line.station + 1.0 < line.waiting_station < line.exit_station - 1.0
+    place = route.line.poses([line.waiting_station])[:, :2]
+    _, beside = roadmap.lanes["wx_0"].line.project(place + np.array([-50.0, 0.0]))
+    assert beside[0] > 0.5 * roadmap.lanes["wx_0"].width
+    assert first_line(roadmap, "wx", "xe").waiting_station is None
+
+
 def test_stop_line_lies_at_the_end_of_its_lane(plain: NetBuilder) -> None:
     roadmap = tee(plain, "priority")
     route = roadmap.route(["wx", "xe"], "wx_0", 10.0, None, 100.0)

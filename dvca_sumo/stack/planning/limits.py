@@ -47,7 +47,7 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
         if high > 0.0:
             part = slice(max(int(low), 0), int(high) + 1)
             caps[part] = np.minimum(caps[part], cap)
-    for line, distance, _, goes_first in views:
+    for line, distance, _, goes_first, _ in views:
         if not goes_first or line.control is _PRIORITY:
             continue
         if distance > 0.0:

@@ -26,7 +26,7 @@ _CREEPING = 4.0  # [m/s] no faster, an ego stops for people who come up to its s
 _BESIDE_PERSON = 1.0  # ... [m] behind its front bumper, and all along it ...
 _BRUSHING = 0.2  # ... for those who would come so near to it [m]
 _CLEAR_GAP = 0.5  # [m] lengthwise behind somebody who has passed
-_AT_LINE = 0.5  # [m] past the stop line the ego may still wait at it
+_AT_PLACE = 1.3  # [m] past the place to let others pass, the ego may still wait there
 
 
 class Demand(msgspec.Struct, frozen=True):
@@ -159,7 +159,7 @@ class Meetings:
         return bool(graph.scene.futures.directions[row, last] > ALONG and last > first + _STAYS)
 
     def _stop(self, row: int, graph: Graph, views: list[LineView]) -> Stop:
-        """Before the other's way until it is clear; at the stop line of one of `views` that the ego has not crossed."""
+        """Before the other's way until it is clear; on a junction of `views` at its place, if that is still ahead."""
         config, front = self._config, self._shape.front
         first, last, scene = graph.first[row], graph.last[row], graph.scene
         is_person = scene.classes[scene.owners[row]] == _PERSON
@@ -176,8 +176,8 @@ class Meetings:
             if nearest <= front and not is_person and touching < graph.path.arcs[-1]:
                 nearest = touching  # it passes close beside the ego, then touches it further on
         at = nearest - gap - front
-        for line, distance, _, _ in views:
+        for line, distance, _, _, place in views:
             is_within = distance - 1.0 <= nearest - front <= distance + line.exit_station - line.station
-            if is_within and distance > -_AT_LINE:
-                at = min(at, distance - config.stop_line_gap)
+            if is_within and place > -_AT_PLACE:
+                at = min(at, place)
         return Stop(at, nearest - _HARD_GAP - front - at, f"yield {graph.track(row)}", until)

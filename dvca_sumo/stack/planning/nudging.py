@@ -289,7 +289,7 @@ class NudgeDecider:
 
     def _is_near_line(self, station: float, views: list[LineView]) -> bool:
         """Whether the place lies on a junction or shortly before its stop line."""
-        for line, distance, _, _ in views:
+        for line, distance, _, _, _ in views:
             to_line = distance + self._shape.front - station
             if line.station - line.exit_station < to_line < self._config.queue_reach:
                 return True

@@ -53,7 +53,7 @@ def _beyond_lane(graph: Graph, views: list[LineView]) -> tuple[Floats, Floats]:
     """How far the body on its path is beyond the left and the right edge of its lane, by metre ahead [m]."""
     window, path = graph.window, graph.path
     left, right = path.left - window.lane_left, window.lane_right - path.right
-    for line, _, _, _ in views:
+    for line, _, _, _, _ in views:
         junction = window.span(line.station - window.station, line.exit_station - window.station)
         left[junction] = right[junction] = -math.inf
     return left[BEHIND:], right[BEHIND:]

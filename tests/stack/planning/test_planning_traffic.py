@@ -386,6 +386,35 @@ def test_ego_that_is_slow_on_the_junction_at_red_lets_the_others_go(lane: str) -
     assert driven.fronts[-1] > 60.0
 
 
+@pytest.mark.parametrize(("waiting", "stands"), [(None, (97.0, 100.0)), (106.0, (102.0, 107.0))])
+def test_oncoming_traffic_is_let_pass_at_green_where_the_junction_has_a_place_to_wait(
+    waiting: float | None, stands: tuple[float, float]
+) -> None:
+    route = road(stop_lines=[stop_line(100.0, Control.SIGNAL, waiting_station=waiting)])
+    stream = [car(k, 110.0, -60.0 - 22.0 * k, heading=UP, speed=8.0, lanes=("major_0",)) for k in range(1, 9)]
+    driven = drive(route, 40.0, speed=8.0, actors=stream, signals=lambda _: {"J/2": SignalColour.PERMISSIVE})
+    standing = driven.fronts[driven.speeds < 0.05]
+    assert stands[0] < standing.min() <= standing.max() < stands[1]
+    assert driven.clearances.min() > 1.0
+    assert driven.fronts[-1] > 130.0
+
+
+def test_who_waits_on_the_junction_leaves_it_when_the_oncoming_traffic_has_to_stop() -> None:
+    route = road(stop_lines=[stop_line(100.0, Control.SIGNAL, waiting_station=106.0)])
+    stream = [
+        car(k, 110.0, -40.0 - 22.0 * k, heading=UP, speed=8.0, lanes=("major_0",), stays_from=18.0) for k in range(1, 9)
+    ]
+
+    def signals(time: float) -> dict[str, SignalColour]:
+        shown = SignalColour.PERMISSIVE if time < 16.0 else SignalColour.YELLOW if time < 19.0 else SignalColour.RED
+        return {"J/2": shown}
+
+    driven = drive(route, 30.0, speed=8.0, actors=stream, signals=signals)
+    assert 102.0 < driven.fronts[160] < 107.0
+    assert driven.clearances.min() > 1.0
+    assert driven.fronts[-1] > 130.0
+
+
 def test_who_was_late_for_yellow_and_then_has_to_stop_before_the_line_waits_there() -> None:
     def signals(time: float) -> dict[str, SignalColour]:
         return {"J/2": SignalColour.GREEN if time < 6.8 else SignalColour.YELLOW if time < 8.0 else SignalColour.RED}
