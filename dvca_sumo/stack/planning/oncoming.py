@@ -7,8 +7,8 @@ import numpy as np
 from dvca_sumo.messages import Floats, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
-from dvca_sumo.stack.planning.reference import BEHIND
-from dvca_sumo.stack.planning.scene import ALONG, Flags
+from dvca_sumo.stack.planning.reference import BEHIND, Window
+from dvca_sumo.stack.planning.scene import ALONG, Extents, Flags, extents
 from dvca_sumo.stack.planning.speed import STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import Graph
 
@@ -26,22 +26,25 @@ def waits(
     They are looked for farther than they are predicted, at the speed they have then. What is begun is gone on with. On
     junctions the rules of meeting hold.
     """
-    left, right = _beyond_lane(graph, views)
+    window, scene = graph.window.up_to_fold(), graph.scene
+    left, right = _beyond_lane(graph, window, views)
     if left.max() <= 0.0 and right.max() <= 0.0:
         return []
-    scene, begun = graph.scene, slice(0, int(shape.front) + 1)
-    directions = scene.futures.directions[: scene.moving]
+    futures, begun = scene.futures, slice(0, int(shape.front) + 1)
+    if window is not graph.window:
+        futures = extents(window, scene.boxes, scene.poses, scene.owners[: scene.moving])
+    directions = futures.directions[: scene.moving]
     comes: Flags = (directions[:, 0] < -ALONG) | (directions[:, -1] < -ALONG)
     found = []
     for row in comes.nonzero()[0].tolist():
-        spare, is_left = _spare(row, graph)
+        spare, is_left = _spare(row, futures, window)
         beyond = left if is_left else right
         meets = beyond > max(spare - config.object_margin, 0.0)
         if not meets.any() or (beyond[begun] > max(spare, 0.0)).any():
             continue
         begin, end = _first(meets, shape.length + config.yield_gap)
         nose, tail = float(graph.path.arcs[begin]) - shape.front, float(graph.path.arcs[end]) + shape.rear_overhang
-        arrives, leaves = _passage(graph.low[row], graph.high[row], scene.times, nose + shape.front, tail)
+        arrives, leaves = _passage(row, futures, scene.times, begin, end)
         free = leaves + config.clear_margin
         if arrives < _time(profile, tail) + config.pass_margin and _time(profile, nose) < free:
             give = config.yield_gap - _HARD_GAP
@@ -49,19 +52,19 @@ def waits(
     return found
 
 
-def _beyond_lane(graph: Graph, views: list[LineView]) -> tuple[Floats, Floats]:
+def _beyond_lane(graph: Graph, window: Window, views: list[LineView]) -> tuple[Floats, Floats]:
     """How far the body on its path is beyond the left and the right edge of its lane, by metre ahead [m]."""
-    window, path = graph.window, graph.path
-    left, right = path.left - window.lane_left, window.lane_right - path.right
+    rows = slice(BEHIND, window.rows.shape[1])
+    left, right = graph.path.left[rows] - window.lane_left[rows], window.lane_right[rows] - graph.path.right[rows]
     for line, _, _, _, _ in views:
-        junction = window.span(line.station - window.station, line.exit_station - window.station)
+        first, last = line.station - window.station, line.exit_station - window.station
+        junction = slice(max(int(first), 0), max(int(last) + 1, 0))
         left[junction] = right[junction] = -math.inf
-    return left[BEHIND:], right[BEHIND:]
+    return left, right
 
 
-def _spare(row: int, graph: Graph) -> tuple[float, bool]:
+def _spare(row: int, futures: Extents, window: Window) -> tuple[float, bool]:
     """How far beyond the lane's edge who comes, as future `row` has it, stays in the end [m]; whether on the left."""
-    futures, window = graph.scene.futures, graph.window
     ahead = (futures.stations[row] > 0.0).nonzero()[0]
     column = int(ahead[-1]) if ahead.size else 0
     place = int(window.index(futures.stations[row, column : column + 1])[0])
@@ -77,17 +80,18 @@ def _first(meets: Flags, bridged: float) -> tuple[int, int]:
     return int(rows[0]), int(rows[breaks[0]] if breaks.size else rows[-1])
 
 
-def _passage(low: Floats, high: Floats, times: Floats, begin: float, end: float) -> tuple[float, float]:
-    """When who comes is on the stretch from `begin` to `end` [m]: from, until [s]; inf for never."""
-    pace = float(low[-1 - _RECENT] - low[-1]) / float(times[-1] - times[-1 - _RECENT])
+def _passage(row: int, futures: Extents, times: Floats, begin: float, end: float) -> tuple[float, float]:
+    """When who comes is on the stretch from station `begin` to `end` [m]: from, until [s]; inf for never."""
+    stations, half_length = futures.stations[row], futures.half_lengths[row]
+    pace = float(stations[-1 - _RECENT] - stations[-1]) / float(times[-1] - times[-1 - _RECENT])
 
-    def reached(nearest: Floats, place: float) -> float:
-        there = (nearest <= place).nonzero()[0]
+    def reached(ends: Floats, place: float) -> float:
+        there = (ends <= place).nonzero()[0]
         if there.size:
             return float(times[there[0]])
-        return float(times[-1] + (nearest[-1] - place) / pace) if pace > _COMES else math.inf
+        return float(times[-1] + (ends[-1] - place) / pace) if pace > _COMES else math.inf
 
-    return reached(low, end), reached(high, begin)
+    return reached(stations - half_length, end), reached(stations + half_length, begin)
 
 
 def _time(profile: Profile, arc: float) -> float:

@@ -15,6 +15,7 @@ _OUTLOOK = 200  # [m]
 _NODES = 6  # rows between the points searched first when projecting
 _ITERATIONS = 6
 _CONVERGED = 1e-4  # [m]
+_TURNED_BACK = 2.4  # [rad]
 _NEAREST_CENTRE = 0.3  # of the distance to the centre of curvature, closest at which a point is still projected
 
 _X, _Y, _COS, _SIN, _HEADING, _CURVATURE, _LIMIT, _LANE_LEFT, _LANE_RIGHT, _ROAD_LEFT, _ROAD_RIGHT = range(11)
@@ -56,6 +57,14 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         np.maximum(rows, 0, out=rows)
         np.minimum(rows, self.rows.shape[1] - 1, out=rows)
         return rows
+
+    def up_to_fold(self) -> "Window":
+        """The part before the line turns back: who is beside that may be nearer to what comes after the turn."""
+        turns = np.abs(self.headings[BEHIND:] - self.headings[BEHIND]) > _TURNED_BACK
+        if not turns.any():
+            return self
+        rows = self.rows[:, : BEHIND + max(int(turns.argmax()), 1)]
+        return Window(self.station, rows, *rows)
 
     def moved(self, offsets: Floats, width: float) -> "Window":
         """The window of a line beside this one, at `offsets` (n,) [m], along a lane so wide [m].

@@ -125,22 +125,36 @@ def _is_around(window: Window, poses: Floats) -> Flags:
     return around
 
 
+def extents(window: Window, boxes: Floats, poses: Floats, owners: Integers) -> Extents:
+    """Of hypotheses (h, t, 3) of the boxes (n, 5) whose rows their `owners` (h,) are."""
+    hypotheses, times, _ = poses.shape
+    placed = _placed(window, poses.reshape(-1, 3), boxes[owners, 3:].repeat(times, axis=0))
+    return Extents(*placed.reshape(5, hypotheses, times))
+
+
 def _extents(
     window: Window, boxes: Floats, poses: Floats, owners: Integers, still: Integers
 ) -> tuple[Extents, Extents]:
     """Of boxes (n, 5) now; and of their futures: hypotheses (h, t, 3), then one for each of `still` that stays."""
     count, (moving, times, _) = len(boxes), poses.shape
     flat = np.concatenate((boxes[:, :3], poses.reshape(-1, 3)))
-    extents = np.empty((5, len(flat)))
-    extents[0], extents[1], headings = window.project(flat[:, :2])
-    halves = 0.5 * np.concatenate((boxes[:, 3:], boxes[owners, 3:].repeat(times, axis=0)))
-    directions = np.cos(flat[:, 2] - headings)
-    cosines, sines = np.abs(directions), np.sqrt(1.0 - directions * directions)
-    extents[2] = halves[:, 0] * cosines + halves[:, 1] * sines
-    extents[3] = halves[:, 0] * sines + halves[:, 1] * cosines
-    extents[4] = directions
-    now = extents[:, :count]
+    sizes = np.concatenate((boxes[:, 3:], boxes[owners, 3:].repeat(times, axis=0)))
+    placed = _placed(window, flat, sizes)
+    now = placed[:, :count]
     futures = np.empty((5, moving + len(still), times))
-    futures[:, :moving] = extents[:, count:].reshape(5, moving, times)
+    futures[:, :moving] = placed[:, count:].reshape(5, moving, times)
     futures[:, moving:] = now[:, still, None]
     return Extents(*now), Extents(*futures)
+
+
+def _placed(window: Window, poses: Floats, sizes: Floats) -> Floats:
+    """The fields of `Extents` (5, k) of boxes at `poses` (k, 3), of `sizes` (k, 2)."""
+    placed = np.empty((5, len(poses)))
+    placed[0], placed[1], headings = window.project(poses[:, :2])
+    halves = 0.5 * sizes
+    directions = np.cos(poses[:, 2] - headings)
+    cosines, sines = np.abs(directions), np.sqrt(1.0 - directions * directions)
+    placed[2] = halves[:, 0] * cosines + halves[:, 1] * sines
+    placed[3] = halves[:, 0] * sines + halves[:, 1] * cosines
+    placed[4] = directions
+    return placed

@@ -7,15 +7,21 @@ import numpy as np
 import pytest
 from planned_drives import Drive, car, drive, road
 
+from dvca_sumo.messages import Floats
 from dvca_sumo.roadmap.route import Route
+
+
+def hump(x: Floats, begin: float, end: float, side: float) -> Floats:
+    """A move of 1.6 m to one side from `begin`, and back, finished at `end`, over 12 m each."""
+    out, back = np.clip((x - begin) / 12.0, 0.0, 1.0), np.clip((x - end) / 12.0 + 1.0, 0.0, 1.0)
+    moved: Floats = 0.8 * side * (np.cos(math.pi * back) - np.cos(math.pi * out))
+    return moved
 
 
 def swerving(side: float) -> Route:
     """A straight lane, and a line that leaves it by 1.6 m to one side from 90 m to 145 m."""
     x = np.arange(0.0, 600.0)
-    out, back = np.clip((x - 90.0) / 15.0, 0.0, 1.0), np.clip((x - 130.0) / 15.0, 0.0, 1.0)
-    y = 0.8 * side * (np.cos(math.pi * back) - np.cos(math.pi * out))
-    route = road(np.column_stack((x, y)))
+    route = road(np.column_stack((x, hump(x, 90.0, 145.0, side))))
     across = route.line.points[:, 1]
     return msgspec.structs.replace(
         route, lane_left=1.6 - across, lane_right=-1.6 - across, road_left=1.6 - across, road_right=-1.6 - across
@@ -50,3 +56,17 @@ def test_who_comes_far_enough_to_the_side_is_not_waited_for() -> None:
     driven = meeting(260.0, 9.0, beside=4.6)
     assert driven.speeds.min() > 5.0
     assert driven.clearances.min() > 0.5
+
+
+def test_who_comes_is_waited_for_where_the_ego_itself_will_come_back_on_that_lane() -> None:
+    x = np.arange(0.0, 116.0)
+    aside = 1.8 * (1.0 - np.cos(math.pi * np.clip((x - 102.0) / 13.0, 0.0, 1.0)))
+    angles = np.linspace(-0.5 * math.pi, 0.5 * math.pi, 12)[1:]
+    turn = np.column_stack((115.0 + 3.4 * np.cos(angles), -0.2 + 3.4 * np.sin(angles)))
+    home = np.column_stack((np.arange(114.0, -100.0, -1.0), np.full(214, 3.2)))
+    route = road(np.concatenate((np.column_stack((x, hump(x, 60.0, 102.0, 1.0) - aside)), turn, home)))
+    across = np.where(route.line.stations < 103.0, route.line.points[:, 1], 0.0)
+    route = msgspec.structs.replace(route, lane_left=1.6 - across, lane_right=-1.6 - across)
+    driven = drive(route, 30.0, speed=8.0, actors=[car(5, 150.0, 3.2, heading=math.pi, speed=8.0)])
+    assert driven.clearances.min() > 0.5
+    assert driven.states[-1, 1] > 80.0
