@@ -31,7 +31,8 @@ _GIVE_AT_OBJECT = 1.0  # [m] of the distance to it is never spent
 def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config: PlanningConfig) -> list[float]:
     """Highest speed by metre of path [m/s]: limit, curves, how fast the wheels turn, passing close by, lines of others.
 
-    Each is braked for in comfort beforehand. Past such a line the ego feels its way until it sees by who waits beside.
+    Each is braked for in comfort beforehand. Past such a line the ego feels its way until it sees by who waits beside:
+    it looks from the middle of its body.
     """
     path = graph.path
     caps = np.minimum(
@@ -53,7 +54,7 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
         if distance > 0.0:
             part = slice(int(distance), int(distance) + 2)
             caps[part] = np.minimum(caps[part], config.give_way_speed)
-        abreast = _hiding(graph, shape.front + distance) - shape.front
+        abreast = _hiding(graph, shape.front + distance) - shape.centre
         if abreast > 0.0:
             part = slice(max(int(min(distance, abreast)), 0), int(abreast) + 1)
             caps[part] = np.minimum(caps[part], config.peering_speed)

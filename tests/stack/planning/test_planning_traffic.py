@@ -341,6 +341,15 @@ def test_past_who_waits_beside_at_a_line_the_ego_feels_its_way(
     assert driven.fronts[-1] > 130.0
 
 
+@pytest.mark.parametrize("nose", [99.0, 102.0])
+def test_ego_feels_its_way_until_the_middle_of_its_body_is_abreast_of_who_hides_what_comes(nose: float) -> None:
+    beside = car(3, nose - 2.25 - 6.0, 3.2, speed=2.0, stays_from=3.0)
+    driven = drive(road(lanes_left=1, stop_lines=[stop_line(100.0, Control.YIELD)]), 20.0, speed=13.0, actors=[beside])
+    peers = (driven.fronts > 100.5) & (driven.states[:, 1] + SHAPE.centre < nose)
+    assert peers.any()
+    assert driven.speeds[peers].max() < 2.6
+
+
 @pytest.mark.parametrize("x", [99.3, 106.0])
 def test_car_that_has_to_wait_is_passed(x: float) -> None:
     """Also where a part of it is on this side of the ego's stop line."""
