@@ -5,7 +5,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import Drive, car, drive, road
+from planned_drives import Drive, car, drive, person, road
 
 from dvca_sumo.messages import Floats
 from dvca_sumo.roadmap.route import Route
@@ -50,6 +50,12 @@ def test_all_who_come_one_behind_the_other_are_waited_for() -> None:
 def test_who_comes_only_after_the_ego_is_back_in_its_lane_is_not_waited_for() -> None:
     driven = meeting(340.0, 9.0)
     assert driven.speeds.min() > 7.0
+
+
+def test_people_who_walk_towards_the_ego_beside_its_way_are_met_there() -> None:
+    driven = drive(swerving(1.0), 40.0, speed=8.0, actors=[person(5, 150.0, 3.05, heading=math.pi, speed=1.4)])
+    assert driven.fronts[-1] > 200.0
+    assert driven.clearances.min() > 0.2
 
 
 def test_who_comes_far_enough_to_the_side_is_not_waited_for() -> None:
