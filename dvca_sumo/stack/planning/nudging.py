@@ -38,7 +38,7 @@ class Nudge(msgspec.Struct, frozen=True):
 
 
 class _Blocker(msgspec.Struct, frozen=True):
-    """A standing object in or close to the way, in window coordinates; or one that starts while it is passed."""
+    """What the ego passes in or close to its way, in window coordinates: where it is while the ego passes."""
 
     track: int
     row: int  # in the scene
@@ -50,6 +50,7 @@ class _Blocker(msgspec.Struct, frozen=True):
     swept_right: float  # [m] of the body where it passes the object, its rear axle on the line: negative
     swept_left: float  # [m]
     wanted: float  # [m] sideways clearance
+    walks: bool  # along the road
 
     def clearance(self, offset: float) -> float:
         """Between body and object, the ego passing at `offset` [m]; negative where they would overlap."""
@@ -93,8 +94,8 @@ class NudgeDecider:
         self._moving = {track: self._moving.get(track, situation.time) for track in moving}
         self._driven &= set(scene.ids)
         self._driven.update(track for track, since in self._moving.items() if situation.time - since > _DRIVING)
-        nudges = []
-        for blocker in self._blockers(situation) if standing or self._held else ():
+        nudges, walks = [], _walks_along(scene)
+        for blocker in self._blockers(situation, walks) if standing or self._held or walks.any() else ():
             offset = self._offset(blocker, situation)
             if offset is not None:
                 nudges.append(Nudge(blocker.track, self._plateau(blocker, offset, situation)))
@@ -117,11 +118,11 @@ class NudgeDecider:
             begin = max(begin, feasible_length(situation.lateral, offset, begin, situation.speed, self._config))
         return Plateau(begin, max(end, begin), offset)
 
-    def _blockers(self, situation: Situation) -> list[_Blocker]:
+    def _blockers(self, situation: Situation, walks: Flags) -> list[_Blocker]:
         """Objects that the ego, centred in its lane, would pass with less than the wanted clearance.
 
-        They stand; who starts to move when the ego is beside them, or too near to fall in behind them in comfort, is
-        passed all the same, or passes the ego.
+        They stand, or walk along the road; who starts to move when the ego is beside them, or too near to fall in
+        behind them in comfort, is passed all the same, or passes the ego.
         """
         scene, window, now, config = situation.scene, situation.window, situation.scene.now, self._config
         wanted = np.where(scene.classes == _PERSON, config.person_clearance, config.nudge_clearance)
@@ -133,7 +134,8 @@ class NudgeDecider:
         rows = now.rows(window)
         swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
         near = now.gaps(swept_left, swept_right) < wanted + config.nudge_hold * is_held
-        near &= scene.is_standing | is_beside
+        near &= scene.is_standing | is_beside | walks
+        met = _met(now.stations, np.where(walks, scene.speeds * now.directions, 0.0), situation.speed)
         near &= now.stations + now.half_lengths > -self._shape.rear_overhang - _ALONG
         near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
         blockers = [
@@ -141,13 +143,14 @@ class NudgeDecider:
                 scene.ids[row],
                 row,
                 float(speeds[row]),
-                float(now.stations[row] - now.half_lengths[row]),
-                float(now.stations[row] + now.half_lengths[row]),
+                float(min(now.stations[row], met[row]) - now.half_lengths[row]),
+                float(max(now.stations[row], met[row]) + now.half_lengths[row]),
                 float(now.offsets[row] - now.half_widths[row]),
                 float(now.offsets[row] + now.half_widths[row]),
                 float(swept_right[row]),
                 float(swept_left[row]),
                 float(wanted[row]),
+                bool(walks[row]),
             )
             for row in near.nonzero()[0].tolist()
         ]
@@ -175,7 +178,7 @@ class NudgeDecider:
                 continue
             is_same = abs(offset - held) < self._config.nudge_hold and self._clears(blocker, held)
             return (held if is_same else offset) or None
-        if lane_right <= lane_left and not turns_in and self._will_stay(blocker, situation):
+        if lane_right <= lane_left and not turns_in and (blocker.walks or self._will_stay(blocker, situation)):
             for offset in (min(max(offset, lane_right), lane_left) for offset in offsets):
                 if self._clears(blocker, offset) and not self._meets_another(blocker, offset, situation.scene):
                     return offset or None
@@ -310,3 +313,16 @@ class NudgeDecider:
         behind = self._shape.rear_overhang + _BAND_GAP + _CLOSING * np.maximum(rates - pace, 0.0)
         beside &= (stations + lengths > ego - behind) & (stations - lengths < ego + self._shape.front + _BAND_GAP)
         return not bool((beside & out).any())
+
+
+def _walks_along(scene: Scene) -> Flags:
+    """Which people walk along the road, one way or the other."""
+    along: Flags = ~scene.is_standing & (scene.classes == _PERSON) & (np.abs(scene.now.directions) > _PARALLEL)
+    return along
+
+
+def _met(stations: Floats, speeds: Floats, speed: float) -> Floats:
+    """Where an ego at `speed` [m/s] meets those who go on from `stations` at `speeds` [m/s] along its way (n,) [m]."""
+    closing = np.maximum(max(speed, _SLOWEST) - speeds, _SLOWEST)
+    met: Floats = stations + speeds * np.maximum(stations, 0.0) / closing
+    return met

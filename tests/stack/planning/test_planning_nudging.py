@@ -125,6 +125,18 @@ def test_person_is_passed_within_the_lane_where_the_next_one_is_not_free() -> No
     assert driven.clearances.min() > 0.35
 
 
+@pytest.mark.parametrize(("x", "heading"), [(120.0, math.pi), (60.0, 0.0)])
+@pytest.mark.parametrize("beside", [-1.25, -1.5])
+def test_people_who_walk_along_the_edge_of_the_lane_are_given_room_within_it(
+    x: float, heading: float, beside: float
+) -> None:
+    driven = drive(road(limit=8.0), 25.0, speed=5.0, actors=[person(3, x, beside, heading=heading, speed=1.3)])
+    assert driven.clearances.min() > 0.45
+    assert offsets(driven)[1] + 0.5 * SHAPE.width < 1.7
+    assert driven.fronts[-1] > 150.0
+    assert abs(driven.states[-1, 2]) < 0.05
+
+
 def test_ego_that_stands_close_to_a_person_beside_its_way_drives_on() -> None:
     driven = drive(road(), 15.0, station=20.0, actors=[person(5, 24.6, -1.62)])
     assert driven.clearances.min() > 0.35
