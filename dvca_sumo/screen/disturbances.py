@@ -38,6 +38,10 @@ class Disturbance(msgspec.Struct, frozen=True):
     object: str
     how: str  # "appeared", "jumped", or "walked into the standing ego"
 
+    def lasts(self, time: float) -> bool:
+        """Whether what that body does at `time` [s] may still come from it."""
+        return 0.0 <= time - self.time <= LASTING
+
 
 class Disturbances:
     """Those that one ego met up to now."""
@@ -82,7 +86,7 @@ class Disturbances:
         sudden = self._sudden.get(name or "")
         if sudden is not None and 0.0 <= time - sudden.time <= REACTION:
             return sudden
-        return next((one for one in self.found if one.object == name and 0.0 <= time - one.time <= LASTING), None)
+        return next((one for one in self.found if one.object == name and one.lasts(time)), None)
 
     def _too_near(self, moment: Moment, rows: list[int]) -> list[int]:
         ego, objects = moment.ego, moment.objects

@@ -19,7 +19,7 @@ import numpy as np
 from dvca_sumo.geometry.boxes import box_of, corners
 from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.roadmap import Lane, RoadMap
-from dvca_sumo.screen.disturbances import Disturbances
+from dvca_sumo.screen.disturbances import Disturbance, Disturbances
 from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Contact, Judgement, Violation
 
@@ -58,12 +58,15 @@ def judged(
     `jam` is who holds up the ego in a jam at that time.
     """
     violations = [(judgement.kind, violation) for judgement in judgements for violation in judgement.violations]
+    violations.sort(key=lambda one: one[1].time)
     contact = next((one for _, one in violations if one.contact is not None), None)
     excuse = "" if contact is None else _excuse(contact, end, roadmap)
     found = []
+    begun: dict[str | None, Disturbance] = {}  # by the body that violations came from
     for oracle, violation in violations:
-        disturbance = disturbances.explain(violation.object, violation.time)
-        if violation.object is not None and disturbance is not None:
+        disturbance = disturbances.explain(violation.object, violation.time) or begun.get(violation.object)
+        if violation.object is not None and disturbance is not None and disturbance.lasts(violation.time):
+            begun[violation.object] = disturbance
             reason = f"{disturbance.object} {disturbance.how} at {disturbance.time:.1f} s"
             found.append(Judged(oracle, violation, Fault.SIMULATOR, reason))
         elif excuse and contact is not None and _belongs(violation, contact):
@@ -72,7 +75,7 @@ def judged(
             found.append(Judged(oracle, violation, Fault.OTHER, f"held up in a jam behind {jam}"))
         else:
             found.append(Judged(oracle, violation, Fault.DRIVER, ""))
-    return tuple(sorted(found, key=lambda one: one.violation.time))
+    return tuple(found)
 
 
 def _belongs(violation: Violation, contact: Violation) -> bool:

@@ -12,6 +12,7 @@ from screen_scenes import LANE_Y, Row, cruise, moment, places
 from dvca_sumo.messages import ObjectClass
 from dvca_sumo.oracles.collision import Collision
 from dvca_sumo.oracles.speed_limit import SpeedLimit
+from dvca_sumo.oracles.ttc import TimeToCollision
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.screen.disturbances import Disturbances
 from dvca_sumo.screen.judging import Fault, judged
@@ -172,6 +173,30 @@ def test_a_jump_behind_or_far_beside_changes_nothing(roads: RoadMap) -> None:
     for x, y in ((20.0, LANE_Y), (60.0, LANE_Y + 9.6)):
         jump = [moment(0.1 * k, 50.0 + k, 10.0, [("car", (x + 5.0 * k, y), 4.0)]) for k in range(3)]
         assert disturbances(jump, roads) == []
+
+
+def test_a_contact_that_follows_from_a_conflict_of_the_simulators_doing_is_so_too(roads: RoadMap) -> None:
+    """It jumps to the side of the way and crosses it: no time is left when anybody could react."""
+
+    def crossing(time: float, y: float) -> Moment:
+        one = moment(time, 50.0 + 10.0 * time, 10.0, [("car", (0.0, 0.0), 0.0)])
+        boxes = np.array([[57.0, y, -math.pi / 2.0, 4.6, 1.8]])
+        objects = msgspec.structs.replace(one.objects, boxes=boxes, velocities=np.array([[0.0, -5.0]]))
+        return msgspec.structs.replace(one, objects=objects)
+
+    def faults(leap: float) -> list[tuple[str, Fault]]:
+        driven = [crossing(0.1 * k, LANE_Y + 7.0 - 0.5 * k + leap * (k <= 0)) for k in range(-10, 9)]
+        where = places(roads)
+        oracles, watch = (Collision(where, Thresholds()), TimeToCollision(where, Thresholds())), Disturbances(where)
+        for one in driven:
+            watch.see(one)
+            for oracle in oracles:
+                oracle.observe(one)
+        judgements = [oracle.conclude(Ending.CUT) for oracle in oracles]
+        return [(one.violation.kind, one.fault) for one in judged(judgements, watch, driven[-1], roads)]
+
+    assert faults(3.0) == [("ttc", Fault.SIMULATOR), ("collision", Fault.SIMULATOR)]
+    assert faults(0.0) == [("ttc", Fault.OTHER), ("collision", Fault.OTHER)]
 
 
 def test_a_contact_with_what_was_inserted_is_counted_apart(roads: RoadMap) -> None:
