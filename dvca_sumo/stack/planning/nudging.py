@@ -162,8 +162,10 @@ class NudgeDecider:
         While the lane is not to be left for what will not move, the room that it leaves will do if it is enough.
         None where there is no way round, or where none is needed.
         """
-        window = situation.window
-        span = window.span(blocker.low - self._shape.front, blocker.high + self._shape.rear_overhang)
+        window, begin = situation.window, blocker.low - self._shape.front
+        if blocker.walks:  # may be met where the lane is wider than on the way there
+            begin = max(begin - blend_length(blocker.wanted, situation.speed, self._config), 0.0)
+        span = window.span(begin, blocker.high + self._shape.rear_overhang)
         lane_left = float((window.lane_left - window.swept_left)[span].min()) + _OVER_LINE
         lane_right = float((window.lane_right - window.swept_right)[span].max()) - _OVER_LINE
         held = self._held[blocker.track].offset if blocker.track in self._held else 0.0

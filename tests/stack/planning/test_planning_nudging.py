@@ -137,6 +137,15 @@ def test_people_who_walk_along_the_edge_of_the_lane_are_given_room_within_it(
     assert abs(driven.states[-1, 2]) < 0.05
 
 
+def test_room_for_who_walks_where_the_lane_is_wider_is_not_made_beyond_its_edge_before() -> None:
+    wide = road(limit=8.0)
+    edge = np.where(wide.line.stations > 100.0, 3.0, 1.6)
+    route = msgspec.structs.replace(wide, lane_left=edge, road_left=edge)
+    driven = drive(route, 25.0, speed=5.0, actors=[person(3, 118.0, -0.9, heading=math.pi, speed=0.6)])
+    before = driven.fronts < 100.0
+    assert driven.states[before, 2].max() + 0.5 * SHAPE.width < 1.75
+
+
 def test_ego_that_stands_close_to_a_person_beside_its_way_drives_on() -> None:
     driven = drive(road(), 15.0, station=20.0, actors=[person(5, 24.6, -1.62)])
     assert driven.clearances.min() > 0.35
