@@ -25,7 +25,7 @@ class LineView(NamedTuple):
     distance: float  # [m] from the front bumper
     stop: str | None  # why the ego must not cross it, if it must not
     goes_first: frozenset[str]  # lanes whose traffic has priority
-    place: float  # [m] from the front bumper to where it is let pass
+    waiting_distance: float  # [m] from the front bumper to where it is let pass
 
 
 class Junctions:
@@ -68,16 +68,16 @@ class Junctions:
         return views
 
     def _view(self, index: int, distance: float, time: float, speed: float) -> LineView:
-        line, place = self._lines[index], distance - self._config.stop_line_gap
+        line, waiting_distance = self._lines[index], distance - self._config.stop_line_gap
         if line.control is Control.SIGNAL:
             stop, goes_first = self._at_signal(index, distance, time, speed)
             if line.waiting_station is not None and self._colour(line.signal_id or "", time) in _GREENS:
-                place = distance + line.waiting_station - line.station
+                waiting_distance = distance + line.waiting_station - line.station
         else:
             stop, goes_first = None, line.yields_to
             if line.control in (Control.STOP, Control.ALL_WAY_STOP) and index not in self._released:
                 stop = self._at_sign(index, time)
-        return LineView(line, distance, stop if distance > -_OVERRUN else None, goes_first, place)
+        return LineView(line, distance, stop if distance > -_OVERRUN else None, goes_first, waiting_distance)
 
     def _at_sign(self, index: int, time: float) -> str | None:
         """Whether to stand on: for a while, and for those who were there first."""
@@ -131,9 +131,10 @@ def has_priority(views: list[LineView], near: float, far: float, lanes: tuple[st
 
     None where the map does not tell: they do not meet on a junction, or not on conflicting lanes.
     """
-    for line, _, _, goes_first, _ in views:
+    for view in views:
+        line = view.line
         if line.station - 1.0 <= far and near <= line.exit_station + _MERGE_REACH:
-            if not goes_first.isdisjoint(lanes):
+            if not view.goes_first.isdisjoint(lanes):
                 return True
             if not (line.yields_to.isdisjoint(lanes) and line.crosses.isdisjoint(lanes)):
                 return False

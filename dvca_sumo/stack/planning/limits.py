@@ -48,8 +48,9 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
         if high > 0.0:
             part = slice(max(int(low), 0), int(high) + 1)
             caps[part] = np.minimum(caps[part], cap)
-    for line, distance, _, goes_first, _ in views:
-        if not goes_first or line.control is _PRIORITY:
+    for view in views:
+        distance = view.distance
+        if not view.goes_first or view.line.control is _PRIORITY:
             continue
         if distance > 0.0:
             part = slice(int(distance), int(distance) + 2)

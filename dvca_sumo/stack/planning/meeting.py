@@ -11,7 +11,7 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView, has_priority
 from dvca_sumo.stack.planning.reference import BEHIND
 from dvca_sumo.stack.planning.scene import ALONG, SOON, SOON_TIME, Flags
-from dvca_sumo.stack.planning.speed import STEP_TIMES, Profile, Stop
+from dvca_sumo.stack.planning.speed import HARD_GAP, STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import PRESENT, Graph
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
@@ -19,10 +19,9 @@ _SPEEDS_UP = 0.4  # [m/s] faster over the next second than now
 _CUTS_IN = 0.5  # [m] moved sideways before the meeting: the other comes into our lane, not we into theirs
 _OFF_LANE = 0.5  # [m] of the body beyond the edge of its lane, by the line, not by what it swerves for
 _STAYS = 2  # columns of the graph, after which somebody is on the path to drive along it
-_HARD_GAP = 0.5  # [m] to the other's way, defended by hard braking
 _STILL_TO_CROSS = 2  # lanes of a person's future: a pavement, then a crossing
 _LEAST_ROOM = 0.1  # [m]
-_CREEPING = 4.0  # [m/s] no faster, an ego stops for people who come up to its side: ...
+_SLOW = 4.0  # [m/s] no faster, an ego stops for people who come up to its side: ...
 _BESIDE_PERSON = 1.0  # ... [m] behind its front bumper, and all along it ...
 _BRUSHING = 0.2  # ... for those who would come so near to it [m]
 _CLEAR_GAP = 0.5  # [m] lengthwise behind somebody who has passed
@@ -77,7 +76,7 @@ class Meetings:
             return None
         stop = self._stop(row, graph, views if others_first else [])
         room = stop.at + stop.give
-        if room <= -_HARD_GAP - self._beside(row, graph, profile):  # stopping there would not help
+        if room <= -HARD_GAP - self._beside(row, graph, profile):  # stopping there would not help
             return None
         is_too_late = profile.speeds[0] ** 2 / (2.0 * max(room, _LEAST_ROOM)) > config.hard_braking
         if is_too_late and self._passes([row], graph, profile, 0.0)[0]:
@@ -87,7 +86,7 @@ class Meetings:
     def _beside(self, row: int, graph: Graph, profile: Profile) -> float:
         """How far behind the front bumper somebody may come to the ego's way, and standing still helps [m]."""
         is_person = graph.scene.classes[graph.scene.owners[row]] == _PERSON
-        if not is_person or profile.speeds[0] >= _CREEPING:
+        if not is_person or profile.speeds[0] >= _SLOW:
             return 0.0
         brushes = bool((graph.gaps[row][graph.occupied[row]] < _BRUSHING).any())
         return self._shape.length if brushes else _BESIDE_PERSON
@@ -171,13 +170,13 @@ class Meetings:
             until = float(scene.times[last]) + config.clear_margin
             if last == len(scene.times) - 1:
                 until = math.inf
-        if nearest - _HARD_GAP <= front:  # its near end comes by; what gets into the way may do so further on
+        if nearest - HARD_GAP <= front:  # its near end comes by; what gets into the way may do so further on
             nearest, touching = graph.contacts(row)
             if nearest <= front and not is_person and touching < graph.path.arcs[-1]:
                 nearest = touching  # it passes close beside the ego, then touches it further on
         at = nearest - gap - front
-        for line, distance, _, _, place in views:
-            is_within = distance - 1.0 <= nearest - front <= distance + line.exit_station - line.station
-            if is_within and place > -_AT_PLACE:
-                at = min(at, place)
-        return Stop(at, nearest - _HARD_GAP - front - at, f"yield {graph.track(row)}", until)
+        for view in views:
+            leave = view.distance + view.line.exit_station - view.line.station
+            if view.distance - 1.0 <= nearest - front <= leave and view.waiting_distance > -_AT_PLACE:
+                at = min(at, view.waiting_distance)
+        return Stop(at, nearest - HARD_GAP - front - at, f"yield {graph.track(row)}", until)

@@ -127,7 +127,7 @@ class NudgeDecider:
         scene, window, now, config = situation.scene, situation.window, situation.scene.now, self._config
         wanted = np.where(scene.classes == _PERSON, config.person_clearance, config.nudge_clearance)
         is_held = np.array([track in self._held for track in scene.ids], dtype=np.bool_)
-        speeds = np.where(scene.is_standing, 0.0, scene.speeds)
+        speeds = np.where(scene.is_standing | walks, 0.0, scene.speeds)  # all the way of who walks is taken
         closing = np.maximum(situation.speed - speeds, 0.0)
         way = closing * closing / (2.0 * config.comfort_braking) + _ALONG
         is_beside = is_held & (now.stations - now.half_lengths < self._shape.front + way)
@@ -294,9 +294,9 @@ class NudgeDecider:
 
     def _is_near_line(self, station: float, views: list[LineView]) -> bool:
         """Whether the place lies on a junction or shortly before its stop line."""
-        for line, distance, _, _, _ in views:
-            to_line = distance + self._shape.front - station
-            if line.station - line.exit_station < to_line < self._config.queue_reach:
+        for view in views:
+            to_line = view.distance + self._shape.front - station
+            if view.line.station - view.line.exit_station < to_line < self._config.queue_reach:
                 return True
         return False
 

@@ -9,14 +9,13 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.reference import BEHIND, Window
 from dvca_sumo.stack.planning.scene import ALONG, Extents, Flags, extents
-from dvca_sumo.stack.planning.speed import STEP_TIMES, Profile, Stop
+from dvca_sumo.stack.planning.speed import HARD_GAP, STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import Graph
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
 _RECENT = 4  # last times of a future, over which its speed is taken
 _COMES = 0.5  # [m/s] slower ones are not expected to get there
 _CREEPS = 1.0  # [m/s] of the ego beyond the end of its profile, at least
-_HARD_GAP = 0.5  # [m] to the stretch, defended by hard braking
 
 
 def waits(
@@ -49,20 +48,19 @@ def waits(
         arrives, leaves = _passage(row, futures, scene.times, begin, end)
         free = leaves + config.clear_margin
         if arrives < _time(profile, tail) + config.pass_margin and _time(profile, nose) < free:
-            give = config.yield_gap - _HARD_GAP
+            give = config.yield_gap - HARD_GAP
             found.append(Stop(nose - config.yield_gap, give, f"yield {graph.track(row)}", free))
     return found
 
 
 def _beyond_lane(graph: Graph, window: Window, views: list[LineView]) -> tuple[Floats, Floats]:
     """How far the body on its path is beyond the left and the right edge of its lane, by metre ahead [m]."""
-    rows = slice(BEHIND, window.rows.shape[1])
-    left, right = graph.path.left[rows] - window.lane_left[rows], window.lane_right[rows] - graph.path.right[rows]
-    for line, _, _, _, _ in views:
-        first, last = line.station - window.station, line.exit_station - window.station
-        junction = slice(max(int(first), 0), max(int(last) + 1, 0))
+    count = window.rows.shape[1]
+    left, right = graph.path.left[:count] - window.lane_left, window.lane_right - graph.path.right[:count]
+    for view in views:
+        junction = window.span(view.line.station - window.station, view.line.exit_station - window.station)
         left[junction] = right[junction] = -math.inf
-    return left, right
+    return left[BEHIND:], right[BEHIND:]
 
 
 def _spare(row: int, futures: Extents, window: Window) -> tuple[float, bool]:

@@ -18,6 +18,7 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 STEP = 0.2  # [s]
 STEPS = 40
 STEP_TIMES: Floats = np.arange(STEPS + 1, dtype=np.float64) * STEP
+HARD_GAP = 0.5  # [m] to another's way, defended by hard braking
 
 _LOOK_AHEAD = 0.7  # [s] the driver steers for the speed allowed where the ego will be then
 _EXPLAINED = 6  # steps in which the demand is looked for that explains the profile
