@@ -7,21 +7,18 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.messages import Floats, ObjectClass, VehicleShape
+from dvca_sumo.stack.planning.blockers import LENGTHWISE, PARALLEL, SLOWEST, Blocker, blockers
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length, feasible_length
-from dvca_sumo.stack.planning.reference import BEHIND, Window
+from dvca_sumo.stack.planning.reference import Window
 from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags, Scene
 
 _VEHICLE, _PERSON, _STATIC = (int(kind) for kind in (ObjectClass.VEHICLE, ObjectClass.PEDESTRIAN, ObjectClass.STATIC))
-_SEEN_LATE = 20.0  # [m] before the end of the window, objects are not yet decided about
-_ALONG = 1.0  # [m] kept lengthwise around an object before the ego moves back
 _OVER_LINE = 0.1  # [m] over the lane marking is not yet another lane
 _COMMITTED = 0.5  # of the offset: from there on it is safer to go on than to go back
-_SLOWEST = 3.0  # [m/s] assumed of the ego when it passes
 _DRIVING = 1.0  # [s] of moving: what is seen first may seem to move for less
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane
-_PARALLEL = 0.95  # cosine of the smallest angle (18 degrees) to the line at which somebody stands aslant
 _CLOSING = 2.0  # [s] of closing speed kept to those who come from behind
 
 
@@ -35,26 +32,6 @@ class Nudge(msgspec.Struct, frozen=True):
     def label(self) -> str:
         """As in `Trajectory.decision`."""
         return f"nudge {'left' if self.plateau.offset > 0.0 else 'right'} {self.track}"
-
-
-class _Blocker(msgspec.Struct, frozen=True):
-    """What the ego passes in or close to its way, in window coordinates: where it is while the ego passes."""
-
-    track: int
-    row: int  # in the scene
-    speed: float  # [m/s]
-    low: float  # [m] stations
-    high: float  # [m]
-    right: float  # [m] offsets
-    left: float  # [m]
-    swept_right: float  # [m] of the body where it passes the object, its rear axle on the line: negative
-    swept_left: float  # [m]
-    wanted: float  # [m] sideways clearance
-    walks: bool  # along the road
-
-    def clearance(self, offset: float) -> float:
-        """Between body and object, the ego passing at `offset` [m]; negative where they would overlap."""
-        return max(self.right - self.swept_left - offset, offset + self.swept_right - self.left)
 
 
 class Situation(msgspec.Struct, frozen=True, eq=False):
@@ -94,8 +71,8 @@ class NudgeDecider:
         self._moving = {track: self._moving.get(track, situation.time) for track in moving}
         self._driven &= set(scene.ids)
         self._driven.update(track for track, since in self._moving.items() if situation.time - since > _DRIVING)
-        nudges, walks = [], _walks_along(scene)
-        for blocker in self._blockers(situation, walks) if standing or self._held or walks.any() else ():
+        nudges = []
+        for blocker in blockers(scene, situation.window, situation.speed, self._held, self._shape, self._config):
             offset = self._offset(blocker, situation)
             if offset is not None:
                 nudges.append(Nudge(blocker.track, self._plateau(blocker, offset, situation)))
@@ -106,11 +83,11 @@ class NudgeDecider:
         }
         return nudges
 
-    def _plateau(self, blocker: _Blocker, offset: float, situation: Situation) -> Plateau:
+    def _plateau(self, blocker: Blocker, offset: float, situation: Situation) -> Plateau:
         """Where the offset has to be reached and left; a move once begun later than that ends where it did before."""
-        begin = blocker.low - self._shape.front - _ALONG
-        end = blocker.high + self._shape.rear_overhang + _ALONG
-        end += blocker.speed * end / max(situation.speed - blocker.speed, _SLOWEST)
+        begin = blocker.low - self._shape.front - LENGTHWISE
+        end = blocker.high + self._shape.rear_overhang + LENGTHWISE
+        end += blocker.speed * end / max(situation.speed - blocker.speed, SLOWEST)
         held = self._held.get(blocker.track)
         if held is not None and held.offset == offset:
             begin = max(begin, held.begin - situation.window.station)
@@ -118,45 +95,7 @@ class NudgeDecider:
             begin = max(begin, feasible_length(situation.lateral, offset, begin, situation.speed, self._config))
         return Plateau(begin, max(end, begin), offset)
 
-    def _blockers(self, situation: Situation, walks: Flags) -> list[_Blocker]:
-        """Objects that the ego, centred in its lane, would pass with less than the wanted clearance.
-
-        They stand, or walk along the road; who starts to move when the ego is beside them, or too near to fall in
-        behind them in comfort, is passed all the same, or passes the ego.
-        """
-        scene, window, now, config = situation.scene, situation.window, situation.scene.now, self._config
-        wanted = np.where(scene.classes == _PERSON, config.person_clearance, config.nudge_clearance)
-        is_held = np.array([track in self._held for track in scene.ids], dtype=np.bool_)
-        speeds = np.where(scene.is_standing | walks, 0.0, scene.speeds)  # all the way of who walks is taken
-        closing = np.maximum(situation.speed - speeds, 0.0)
-        way = closing * closing / (2.0 * config.comfort_braking) + _ALONG
-        is_beside = is_held & (now.stations - now.half_lengths < self._shape.front + way)
-        rows = now.rows(window)
-        swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
-        near = now.gaps(swept_left, swept_right) < wanted + config.nudge_hold * is_held
-        near &= scene.is_standing | is_beside | walks
-        met = _met(now.stations, np.where(walks, scene.speeds * now.directions, 0.0), situation.speed)
-        near &= now.stations + now.half_lengths > -self._shape.rear_overhang - _ALONG
-        near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
-        blockers = [
-            _Blocker(
-                scene.ids[row],
-                row,
-                float(speeds[row]),
-                float(min(now.stations[row], met[row]) - now.half_lengths[row]),
-                float(max(now.stations[row], met[row]) + now.half_lengths[row]),
-                float(now.offsets[row] - now.half_widths[row]),
-                float(now.offsets[row] + now.half_widths[row]),
-                float(swept_right[row]),
-                float(swept_left[row]),
-                float(wanted[row]),
-                bool(walks[row]),
-            )
-            for row in near.nonzero()[0].tolist()
-        ]
-        return sorted(blockers, key=lambda blocker: blocker.low)
-
-    def _offset(self, blocker: _Blocker, situation: Situation) -> float | None:
+    def _offset(self, blocker: Blocker, situation: Situation) -> float | None:
         """The offset to pass at: on the side of the last cycle if that still works, else the smaller one.
 
         While the lane is not to be left for what will not move, the room that it leaves will do if it is enough.
@@ -186,7 +125,7 @@ class NudgeDecider:
                     return offset or None
         return None
 
-    def _candidates(self, blocker: _Blocker, window: Window, span: slice) -> list[float]:
+    def _candidates(self, blocker: Blocker, window: Window, span: slice) -> list[float]:
         """At most one offset to the left and one to the right: the wanted clearance, or what road and wheels allow."""
         edge, least = self._config.edge_clearance, self._config.nudge_clearance_least
         inward_left, inward_right = self._steerable(window.curvatures[span])
@@ -211,20 +150,20 @@ class NudgeDecider:
             1.0 / right + tightest if right < 0.0 else -math.inf,
         )
 
-    def _clears(self, blocker: _Blocker, offset: float) -> bool:
+    def _clears(self, blocker: Blocker, offset: float) -> bool:
         return blocker.clearance(offset) >= self._config.nudge_clearance_least
 
-    def _meets_another(self, blocker: _Blocker, offset: float, scene: Scene) -> bool:
+    def _meets_another(self, blocker: Blocker, offset: float, scene: Scene) -> bool:
         """Whether another standing object leaves no room at that offset, alongside this one."""
         now = scene.now
-        low = blocker.low - self._shape.front - now.half_lengths - _ALONG
-        high = blocker.high + self._shape.rear_overhang + now.half_lengths + _ALONG
+        low = blocker.low - self._shape.front - now.half_lengths - LENGTHWISE
+        high = blocker.high + self._shape.rear_overhang + now.half_lengths + LENGTHWISE
         alongside = scene.is_standing & (now.stations > low) & (now.stations < high)
         alongside[blocker.row] = False
         gaps = now.gaps(np.asarray(offset + blocker.swept_left), np.asarray(offset + blocker.swept_right))
         return bool((alongside & (gaps < self._config.nudge_clearance_least - 1e-6)).any())
 
-    def _may_leave_lane(self, blocker: _Blocker, offset: float, situation: Situation, *, has_left: bool) -> bool:
+    def _may_leave_lane(self, blocker: Blocker, offset: float, situation: Situation, *, has_left: bool) -> bool:
         """For what will not move by itself, when the other lane is free; always to finish what was begun."""
         if has_left and (blocker.track not in self._since or situation.lateral.offset / offset > _COMMITTED):
             return True
@@ -234,7 +173,7 @@ class NudgeDecider:
         band = (blocker.low - self._shape.front - length, blocker.high + length)
         return self._is_free(offset, band, situation.speed, situation.scene)
 
-    def _will_stay(self, blocker: _Blocker, situation: Situation) -> bool:
+    def _will_stay(self, blocker: Blocker, situation: Situation) -> bool:
         """Whether it has stood for so long, where it is, that it will not move by itself."""
         if blocker.track not in self._since:
             return False
@@ -252,7 +191,7 @@ class NudgeDecider:
             patience = max(patience, self._config.broken_down_after)
         return stood >= patience and not self._is_queueing(blocker, situation)
 
-    def _is_in_traffic(self, blocker: _Blocker, situation: Situation) -> bool:
+    def _is_in_traffic(self, blocker: Blocker, situation: Situation) -> bool:
         """Who stands in the middle of our lane may be in a queue that it hides.
 
         Near a junction anyone may; farther away, who was seen driving.
@@ -265,15 +204,15 @@ class NudgeDecider:
         is_near = any(0.0 < distance < self._config.queue_length for distance in to_lines)
         return is_near or blocker.track in self._driven
 
-    def _turns_in(self, blocker: _Blocker, situation: Situation) -> bool:
+    def _turns_in(self, blocker: Blocker, situation: Situation) -> bool:
         """Whether a vehicle stands aslant in our way at a junction: it drives on into our lane as soon as it can."""
         scene, row = situation.scene, blocker.row
         if scene.classes[row] != _VEHICLE or blocker.clearance(0.0) >= self._config.object_margin:
             return False
-        is_aslant = ALONG < float(scene.now.directions[row]) < _PARALLEL
+        is_aslant = ALONG < float(scene.now.directions[row]) < PARALLEL
         return is_aslant and self._is_near_line(blocker.high, situation.views)
 
-    def _is_queueing(self, blocker: _Blocker, situation: Situation) -> bool:
+    def _is_queueing(self, blocker: Blocker, situation: Situation) -> bool:
         """A vehicle in our lane may just wait, however long it has stood: near a line, or behind one that waits."""
         scene, now = situation.scene, situation.scene.now
         is_vehicle = (scene.classes != _PERSON) & (scene.classes != _STATIC)
@@ -305,7 +244,7 @@ class NudgeDecider:
         if not scene.moving:
             return True
         futures, moving = scene.futures, slice(0, scene.moving)
-        pace = max(speed, _SLOWEST)
+        pace = max(speed, SLOWEST)
         ego: Floats = pace * scene.times
         out: Flags = (ego > band[0]) & (ego < band[1])
         stations, lengths = futures.stations[moving], futures.half_lengths[moving]
@@ -315,16 +254,3 @@ class NudgeDecider:
         behind = self._shape.rear_overhang + _BAND_GAP + _CLOSING * np.maximum(rates - pace, 0.0)
         beside &= (stations + lengths > ego - behind) & (stations - lengths < ego + self._shape.front + _BAND_GAP)
         return not bool((beside & out).any())
-
-
-def _walks_along(scene: Scene) -> Flags:
-    """Which people walk along the road, one way or the other."""
-    along: Flags = ~scene.is_standing & (scene.classes == _PERSON) & (np.abs(scene.now.directions) > _PARALLEL)
-    return along
-
-
-def _met(stations: Floats, speeds: Floats, speed: float) -> Floats:
-    """Where an ego at `speed` [m/s] meets those who go on from `stations` at `speeds` [m/s] along its way (n,) [m]."""
-    closing = np.maximum(max(speed, _SLOWEST) - speeds, _SLOWEST)
-    met: Floats = stations + speeds * np.maximum(stations, 0.0) / closing
-    return met
