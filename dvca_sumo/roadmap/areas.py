@@ -1,4 +1,4 @@
-"""What of a junction is there to drive on: all of its area that is not for people on foot."""
+"""What of a junction is there to drive on: its lanes, and all of its area that is not for people on foot."""
 
 from collections.abc import Iterable, Sequence
 
@@ -12,12 +12,19 @@ _FARTHEST = 1.5  # [m] beyond the edge of the road beside its lane, up to which 
 Shape = Sequence[tuple[float, float]]
 
 
-def area_of(outline: Shape, walking: Iterable[Shape]) -> shapely.Geometry:
-    """A junction within its `outline`, without the `walking` areas; empty where the net draws none."""
-    area = polygon(outline)
-    for corner in walking:
-        area = area.difference(polygon(corner))
-    return area
+def area_of(
+    outline: Shape, walking: Iterable[Shape] = (), lanes: Sequence[tuple[Floats, float]] = ()
+) -> shapely.Geometry:
+    """A junction within its `outline`, with its vehicles' `lanes`, without the `walking` areas beside those.
+
+    Lanes are centre lines (n, 2) and widths [m]. A walking area that one of them leads across is road: what people
+    walk on from crossing to crossing in the middle of a junction. Empty where the net draws none of all that.
+    """
+    lines = [shapely.LineString(line) for line, _ in lanes]
+    driven = shapely.MultiLineString(lines)
+    corners = [corner for corner in map(polygon, walking) if not driven.intersects(corner)]
+    strips = shapely.buffer(lines, [0.5 * width for _, width in lanes], cap_style="flat")
+    return shapely.union_all([polygon(outline).difference(shapely.union_all(corners)), *strips])
 
 
 def widened(edges: Floats, points: Floats, headings: Floats, area: shapely.Geometry) -> Floats:

@@ -196,7 +196,8 @@ def _on_junctions(
     for passage in passages:
         first, last = np.searchsorted(line.stations, (passage.begin, passage.end))
         rows, junction = slice(int(first), int(last)), net.junctions[passage.movement.junction]
-        area = area_of(junction.outline, junction.walking.values())
+        lanes = [net.lanes[name] for movement in junction.movements for name in movement.internal]
+        area = area_of(junction.outline, junction.walking.values(), [(lane.line.points, lane.width) for lane in lanes])
         for edge in edges:
             edge[rows] = widened(edge[rows], line.points[rows], line.headings[rows], area)
     return _fixed(edges[0]), _fixed(edges[1])

@@ -25,6 +25,21 @@ def test_what_is_for_people_is_left_to_them() -> None:
     assert edges(-1.0, SQUARE, corner) == pytest.approx([-2.1, -3.0, -2.5, -2.5, -2.1])
 
 
+def test_where_vehicles_lanes_lead_across_people_walk_on_the_road() -> None:
+    island = [(4.0, -3.0), (10.0, -3.0), (10.0, -2.5), (4.0, -2.5)]
+    across, along = np.array([[5.0, -3.0], [5.0, 9.0]]), np.array([[0.0, 0.0], [10.0, 0.0]])
+    for lane, edge in ((across, -3.0), (along, -2.5)):
+        found = widened(np.full(5, -2.1), POINTS, np.zeros(5), area_of(SQUARE, [island], [(lane, 2.0)]))
+        assert found == pytest.approx([-2.1, -3.0, edge, edge, -2.1])
+
+
+def test_lanes_are_road_where_the_outline_leaves_them_out() -> None:
+    beside = np.array([[4.0, -2.0], [10.0, -2.0]])
+    narrow = [(0.0, -1.0), (10.0, -1.0), (10.0, 20.0), (0.0, 20.0)]
+    found = widened(np.full(5, -2.1), POINTS, np.zeros(5), area_of(narrow, (), [(beside, 3.0)]))
+    assert found == pytest.approx([-2.1, -2.1, -3.5, -3.5, -2.1])
+
+
 @pytest.mark.parametrize(
     "outline",
     [[], [(0.0, 0.0)], [(0.0, 0.0), (10.0, 0.0)], [(0.0, 0.0), (10.0, 0.0), (5.0, 0.0)], [*SQUARE[:2], SQUARE[0]]],

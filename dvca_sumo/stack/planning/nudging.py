@@ -98,8 +98,8 @@ class NudgeDecider:
     def _offset(self, blocker: Blocker, situation: Situation) -> float | None:
         """The offset to pass at: on the side of the last cycle if that still works, else the smaller one.
 
-        While the lane is not to be left for what will not move, the room that it leaves will do if it is enough.
-        None where there is no way round, or where none is needed.
+        While there is no room beside for the wanted clearance, the room that the lane leaves will do if it is enough,
+        or else the least clearance. None where there is no way round, or where none is needed.
         """
         window, begin = situation.window, blocker.low - self._shape.front
         if blocker.walks:  # may be met where the lane is wider than on the way there
@@ -109,21 +109,29 @@ class NudgeDecider:
         lane_right = float((window.lane_right - window.swept_right)[span].max()) - _OVER_LINE
         held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
         offsets = self._candidates(blocker, window, span)
-        has_left = not lane_right <= held <= lane_left
+        begun = 0.0 if lane_right <= held <= lane_left else held
         turns_in = self._turns_in(blocker, situation)
-        for offset in sorted(offsets, key=lambda offset: (offset * held <= 0.0, abs(offset))):
+        offsets.sort(key=lambda offset: (offset * held <= 0.0, abs(offset)))
+        open_sides = [offset for offset in offsets if not self._meets_another(blocker, offset, situation.scene)]
+        for offset in open_sides:
             stays_in_lane = offset == 0.0 or (lane_right <= offset <= lane_left and not turns_in)
-            if self._meets_another(blocker, offset, situation.scene) or not (
-                stays_in_lane or self._may_leave_lane(blocker, offset, situation, has_left=has_left)
-            ):
-                continue
-            is_same = abs(offset - held) < self._config.nudge_hold and self._clears(blocker, held)
-            return (held if is_same else offset) or None
+            if stays_in_lane or self._may_leave_lane(blocker, offset, begun, situation):
+                is_same = abs(offset - held) < self._config.nudge_hold and self._clears(blocker, held)
+                return (held if is_same else offset) or None
         if lane_right <= lane_left and not turns_in and (blocker.walks or self._will_stay(blocker, situation)):
             for offset in (min(max(offset, lane_right), lane_left) for offset in offsets):
                 if self._clears(blocker, offset) and not self._meets_another(blocker, offset, situation.scene):
                     return offset or None
+        for offset in (self._tight(blocker, offset) for offset in open_sides):
+            if not self._meets_another(blocker, offset, situation.scene) and self._may_leave_lane(
+                blocker, offset, begun, situation
+            ):
+                return offset
         return None
+
+    def _tight(self, blocker: Blocker, offset: float) -> float:
+        """The offset on the same side that leaves the least clearance."""
+        return offset - math.copysign(blocker.clearance(offset) - self._config.nudge_clearance_least, offset)
 
     def _candidates(self, blocker: Blocker, window: Window, span: slice) -> list[float]:
         """At most one offset to the left and one to the right: the wanted clearance, or what road and wheels allow."""
@@ -163,15 +171,22 @@ class NudgeDecider:
         gaps = now.gaps(np.asarray(offset + blocker.swept_left), np.asarray(offset + blocker.swept_right))
         return bool((alongside & (gaps < self._config.nudge_clearance_least - 1e-6)).any())
 
-    def _may_leave_lane(self, blocker: Blocker, offset: float, situation: Situation, *, has_left: bool) -> bool:
-        """For what will not move by itself, when the other lane is free; always to finish what was begun."""
-        if has_left and (blocker.track not in self._since or situation.lateral.offset / offset > _COMMITTED):
+    def _may_leave_lane(self, blocker: Blocker, offset: float, begun: float, situation: Situation) -> bool:
+        """For what will not move by itself, when the other lane is free; always to finish what was `begun`.
+
+        That is the offset of the last cycle if it is beyond the lane, else 0.
+        """
+        if (
+            begun * offset > 0.0
+            and abs(offset) <= abs(begun) + self._config.nudge_hold
+            and (blocker.track not in self._since or situation.lateral.offset / offset > _COMMITTED)
+        ):
             return True
         if not self._will_stay(blocker, situation):
             return False
         length = blend_length(offset, situation.speed, self._config)
         band = (blocker.low - self._shape.front - length, blocker.high + length)
-        return self._is_free(offset, band, situation.speed, situation.scene)
+        return self._is_free(offset, band, situation)
 
     def _will_stay(self, blocker: Blocker, situation: Situation) -> bool:
         """Whether it has stood for so long, where it is, that it will not move by itself."""
@@ -239,12 +254,13 @@ class NudgeDecider:
                 return True
         return False
 
-    def _is_free(self, offset: float, band: tuple[float, float], speed: float, scene: Scene) -> bool:
-        """Whether nobody who moves comes alongside while the ego is out of its lane."""
+    def _is_free(self, offset: float, band: tuple[float, float], situation: Situation) -> bool:
+        """Whether nobody who moves comes alongside while the ego is out of its lane; who is right behind it follows."""
+        scene = situation.scene
         if not scene.moving:
             return True
-        futures, moving = scene.futures, slice(0, scene.moving)
-        pace = max(speed, SLOWEST)
+        futures, moving, now = scene.futures, slice(0, scene.moving), scene.now
+        pace = max(situation.speed, SLOWEST)
         ego: Floats = pace * scene.times
         out: Flags = (ego > band[0]) & (ego < band[1])
         stations, lengths = futures.stations[moving], futures.half_lengths[moving]
@@ -253,4 +269,5 @@ class NudgeDecider:
         rates = (stations[:, -1:] - stations[:, :1]) / (scene.times[-1] - scene.times[0])
         behind = self._shape.rear_overhang + _BAND_GAP + _CLOSING * np.maximum(rates - pace, 0.0)
         beside &= (stations + lengths > ego - behind) & (stations - lengths < ego + self._shape.front + _BAND_GAP)
-        return not bool((beside & out).any())
+        follows = (now.stations < 0.0) & (np.abs(now.offsets - situation.lateral.offset) < now.half_widths + self._half)
+        return not bool((beside & out)[~follows[scene.owners[moving]]].any())

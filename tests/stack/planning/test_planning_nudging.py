@@ -125,6 +125,21 @@ def test_person_is_passed_within_the_lane_where_the_next_one_is_not_free() -> No
     assert driven.clearances.min() > 0.35
 
 
+def test_where_the_next_lane_is_busy_the_ego_passes_closer_and_keeps_off_it() -> None:
+    busy = [car(10 + i, 200.0 + 12.0 * i, 3.3, heading=math.pi, speed=8.0) for i in range(40)]
+    driven = drive(road(lanes_left=1), 30.0, speed=8.0, actors=[person(5, 117.0, -0.6), *busy])
+    assert driven.fronts[-1] > 130.0
+    assert driven.clearances.min() > 0.3
+
+
+def test_who_starts_right_behind_the_ego_follows_it_and_does_not_keep_it_from_pulling_out() -> None:
+    follower = car(7, 101.3, speed=1.0, leaves=3.3, stays_from=4.3)
+    driven = drive(road(lanes_left=1), 10.0, station=106.0, actors=[person(5, 115.0, -0.5), follower])
+    begun = next(i for i, decision in enumerate(driven.decisions) if decision.startswith("nudge"))
+    assert not any(decision.startswith("stop") for decision in driven.decisions[begun:])
+    assert driven.fronts[-1] > 125.0
+
+
 @pytest.mark.parametrize(("x", "heading"), [(120.0, math.pi), (60.0, 0.0)])
 @pytest.mark.parametrize("beside", [-1.25, -1.5])
 def test_people_who_walk_along_the_edge_of_the_lane_are_given_room_within_it(
