@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dvca_sumo.record import Record
-from dvca_sumo.run.departing import Departing, RoadMapOf, free_flow
+from dvca_sumo.run.departing import Departing, RoadMapOf, free_flow, patience
 from dvca_sumo.run.drive import Drive, DriveResult, Judging
 from dvca_sumo.run.simulation import Over, Simulation
 from dvca_sumo.run.task import StopRule, Task
@@ -28,6 +28,7 @@ __all__ = [
     "departed",
     "free_flow",
     "opened",
+    "patience",
     "rtest",
 ]
 

@@ -78,8 +78,8 @@ class Departing:
 
     def latest(self, entry: Entry, route: Route) -> float:
         """When a trip ends at the latest [s]: at the scenario's end, or when patience does."""
-        patience = _PATIENCE_BASE + _PATIENCE * free_flow(route)
-        return min(entry.time + patience, math.inf if self._scenario.end is None else self._scenario.end)
+        end = math.inf if self._scenario.end is None else self._scenario.end
+        return min(entry.time + patience(free_flow(route)), end)
 
     def drive(self, entry: Entry, task: Task, world: World, *, is_whole: bool = True) -> Drive:
         """Adopt a vehicle that has just departed; see `Drive` for `is_whole`.
@@ -118,6 +118,11 @@ def free_flow(route: Route) -> float:
     stations = route.line.stations
     driven = (stations[1:] > route.start) & (stations[1:] <= route.destination)
     return float(np.sum(np.diff(stations)[driven] / route.speed_limits[1:][driven]))
+
+
+def patience(freely: float) -> float:
+    """How long a trip may take [s] that takes so long at the speed limits [s]."""
+    return _PATIENCE_BASE + _PATIENCE * freely
 
 
 def _thresholds(entry: Entry) -> Thresholds:

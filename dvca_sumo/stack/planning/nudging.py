@@ -109,14 +109,15 @@ class NudgeDecider:
         lane_right = float((window.lane_right - window.swept_right)[span].max()) - _OVER_LINE
         held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
         offsets = self._candidates(blocker, window, span)
-        begun = 0.0 if lane_right <= held <= lane_left else held
+        hold = self._config.nudge_hold
+        begun = 0.0 if lane_right - hold <= held <= lane_left + hold else held
         turns_in = self._turns_in(blocker, situation)
         offsets.sort(key=lambda offset: (offset * held <= 0.0, abs(offset)))
         open_sides = [offset for offset in offsets if not self._meets_another(blocker, offset, situation.scene)]
         for offset in open_sides:
             stays_in_lane = offset == 0.0 or (lane_right <= offset <= lane_left and not turns_in)
             if stays_in_lane or self._may_leave_lane(blocker, offset, begun, situation):
-                is_same = abs(offset - held) < self._config.nudge_hold and self._clears(blocker, held)
+                is_same = abs(offset - held) < hold and self._clears(blocker, held)
                 return (held if is_same else offset) or None
         if lane_right <= lane_left and not turns_in and (blocker.walks or self._will_stay(blocker, situation)):
             for offset in (min(max(offset, lane_right), lane_left) for offset in offsets):

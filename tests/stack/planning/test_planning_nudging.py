@@ -161,6 +161,16 @@ def test_room_for_who_walks_where_the_lane_is_wider_is_not_made_beyond_its_edge_
     assert driven.states[before, 2].max() + 0.5 * SHAPE.width < 1.75
 
 
+@pytest.mark.parametrize("beside", [-1.35, -1.0])
+def test_lane_that_gets_narrower_is_not_left_for_who_walks_along_it(beside: float) -> None:
+    straight = road(limit=8.0, lanes_left=1)
+    edge = np.interp(straight.line.stations, [60.0, 140.0], [1.7, 1.5])
+    route = msgspec.structs.replace(straight, lane_left=edge)
+    driven = drive(route, 20.0, speed=5.0, actors=[person(3, 125.0, beside, heading=math.pi, speed=0.8)])
+    assert offsets(driven)[1] + 0.5 * SHAPE.width < 1.8
+    assert driven.clearances.min() > 0.3
+
+
 def test_ego_that_stands_close_to_a_person_beside_its_way_drives_on() -> None:
     driven = drive(road(), 15.0, station=20.0, actors=[person(5, 24.6, -1.62)])
     assert driven.clearances.min() > 0.35
