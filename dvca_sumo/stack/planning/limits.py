@@ -4,14 +4,15 @@ import math
 
 import numpy as np
 
-from dvca_sumo.messages import ObjectClass, VehicleShape
+from dvca_sumo.geometry.boxes import corners
+from dvca_sumo.messages import Integers, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Control
 from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.exits import ahead, is_blocked
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.reference import BEHIND
-from dvca_sumo.stack.planning.scene import ALONG
+from dvca_sumo.stack.planning.scene import ALONG, Flags
 from dvca_sumo.stack.planning.speed import Stop, slowed_before
 from dvca_sumo.stack.planning.st_graph import Graph
 
@@ -109,15 +110,27 @@ def _at_line(distance: float, label: str, config: PlanningConfig) -> Stop:
 def _obstacle(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> int | None:
     """The nearest future that stands in the way, as a row; not one that the front bumper has cleared already.
 
-    In the way is also what leaves the path no room between its bounds.
+    In the way is also what leaves the path no room between its bounds, and what the body, beside it, would touch.
     """
     scene, blocker = graph.scene, blocking(graph, shape, config)
     still = slice(scene.moving, None)
     low = graph.low[still, 0]
-    in_way = graph.occupied[still, 0] & ((low > shape.front) | (graph.gaps[still, 0] < 0.0))
+    is_beside = graph.occupied[still, 0] & (low <= shape.front) & (graph.gaps[still, 0] < 0.0)
+    if is_beside.any():
+        is_beside[is_beside] = ~_is_behind(graph, scene.owners[still][is_beside], shape)
+    in_way = is_beside | (graph.occupied[still, 0] & (low > shape.front))
     if blocker is not None:
         in_way |= scene.owners[still] == blocker
     return scene.moving + int(np.where(in_way, low, np.inf).argmin()) if in_way.any() else None
+
+
+def _is_behind(graph: Graph, rows: Integers, shape: VehicleShape) -> Flags:
+    """Whether objects, as `rows` (k,) of the scene, are wholly behind the rear bumper, however near: (k,)."""
+    path = graph.path
+    spots = corners(graph.scene.boxes[rows]) - np.array([path.x[0], path.y[0]])
+    ahead = spots @ np.array([math.cos(path.headings[0]), math.sin(path.headings[0])])
+    behind: Flags = ahead.max(axis=1) < -shape.rear_overhang
+    return behind
 
 
 def _passing_speeds(graph: Graph, config: PlanningConfig) -> list[tuple[int, float]]:

@@ -529,3 +529,13 @@ def test_where_its_line_comes_back_to_the_lane_the_ego_lets_those_on_the_lane_go
     driven = drive(route, 12.0, station=5.0, actors=[car(7, -8.0, 5.2, heading=-0.15, speed=speed)])
     assert driven.clearances.min() > 0.4  # what is accepted beside something
     assert driven.fronts[-1] > 40.0
+
+
+@pytest.mark.parametrize("station", [106.0, 108.0, 110.0])
+def test_who_stands_right_behind_the_ego_in_a_tight_turn_does_not_hold_it(station: float) -> None:
+    route = road(curve_points(5.0))
+    x, y, heading = route.line.poses([station])[0].tolist()
+    follower = car(5, x - 3.6 * math.cos(heading), y - 3.6 * math.sin(heading), heading=heading - 0.85)
+    driven = drive(route, 8.0, station=station, actors=[follower])
+    assert 0.3 < driven.clearances[0] < 1.0
+    assert driven.speeds[-1] > 3.0
