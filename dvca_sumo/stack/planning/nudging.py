@@ -101,14 +101,16 @@ class NudgeDecider:
         While there is no room beside for the wanted clearance, the room that the lane leaves will do if it is enough,
         or else the least clearance. None where there is no way round, or where none is needed.
         """
-        window, begin = situation.window, blocker.low - self._shape.front
+        window, begin, end = situation.window, blocker.low - self._shape.front, blocker.high + self._shape.rear_overhang
+        blend = blend_length(blocker.wanted, situation.speed, self._config)
+        whole = window.span(max(begin - 0.5 * blend, 0.0), end + 0.5 * blend)
         if blocker.walks:  # may be met where the lane is wider than on the way there
-            begin = max(begin - blend_length(blocker.wanted, situation.speed, self._config), 0.0)
-        span = window.span(begin, blocker.high + self._shape.rear_overhang)
+            begin = max(begin - blend, 0.0)
+        span = window.span(begin, end)
         lane_left = float((window.lane_left - window.swept_left)[span].min()) + _OVER_LINE
         lane_right = float((window.lane_right - window.swept_right)[span].max()) - _OVER_LINE
         held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
-        offsets = self._candidates(blocker, window, span)
+        offsets = self._candidates(blocker, window, whole)
         hold = self._config.nudge_hold
         begun = 0.0 if lane_right - hold <= held <= lane_left + hold else held
         turns_in = self._turns_in(blocker, situation)

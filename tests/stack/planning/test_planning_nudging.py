@@ -161,6 +161,17 @@ def test_room_for_who_walks_where_the_lane_is_wider_is_not_made_beyond_its_edge_
     assert driven.states[before, 2].max() + 0.5 * SHAPE.width < 1.75
 
 
+def test_road_is_not_left_on_the_way_to_where_it_is_wider() -> None:
+    wide = road(lanes_left=1)
+    edge = np.where(wide.line.stations < 112.0, 1.6, wide.road_left)
+    route = msgspec.structs.replace(wide, road_left=edge)
+    driven = drive(route, 30.0, speed=8.0, actors=[person(3, 118.0, -0.7)])
+    before = driven.fronts < 112.0
+    assert driven.states[before, 2].max() + 0.5 * SHAPE.width < 1.7
+    later = drive(route, 30.0, speed=8.0, actors=[person(3, 132.0, -0.7)])
+    assert later.fronts[-1] > 140.0
+
+
 @pytest.mark.parametrize("beside", [-1.35, -1.0])
 def test_lane_that_gets_narrower_is_not_left_for_who_walks_along_it(beside: float) -> None:
     straight = road(limit=8.0, lanes_left=1)
