@@ -1,6 +1,8 @@
 """How much room there is to either side of a route's line, and where lanes run beside it."""
 
-from collections.abc import Mapping, Sequence
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
 
 import msgspec
 import numpy as np
@@ -47,20 +49,33 @@ def bounds(
     return found
 
 
-def lane_change(line: Polyline, change: Change) -> LaneChange:
-    """Where the lanes of `change`, whose stations are on `line`, run beside it."""
+def lane_change(line: Polyline, change: Change, junctions: Iterable[tuple[float, float]]) -> LaneChange:
+    """Where the lanes of `change`, whose stations are on `line`, run beside it; likewise all `junctions` on the way."""
     first, last = np.searchsorted(line.stations, (change.begin, change.latest))
     rows = slice(int(first), max(int(last), int(first)) + 1)
-    offsets = np.stack([evened(_centre(line, lane, rows)) for lane in change.lanes])
+    beside_line = [_way_beside(line, way, rows) for way in change.ways]
+    offsets = np.stack([evened(centres) for centres, _ in beside_line])
     offsets.setflags(write=False)
     return LaneChange(
-        lanes=tuple(lane.id for lane in change.lanes),
-        widths=tuple(lane.width for lane in change.lanes),
+        lanes=tuple(ids for _, ids in beside_line),
+        widths=tuple(min(lane.width for lane in way) for way in change.ways),
         start_station=change.begin,
         latest_station=change.latest,
         stations=line.stations[rows],
         offsets=offsets,
+        junctions=tuple((begin, end) for begin, end in junctions if change.begin < begin < change.latest),
     )
+
+
+def _way_beside(line: Polyline, way: Sequence[Lane], rows: slice) -> tuple[Floats, tuple[str, ...]]:
+    """Offsets of lanes that lead from one to the next from the points `rows` of `line` [m], and which lane it is."""
+    whole = Polyline(np.concatenate([lane.line.points for lane in way]))
+    offsets, is_beside = beside(line, whole, rows)
+    stations, _ = whole.project(line.points[rows])
+    gaps = [math.dist(lane.line.points[-1], after.line.points[0]) for lane, after in itertools.pairwise(way)]
+    ends = np.cumsum([lane.line.length + gap for lane, gap in zip(way, gaps, strict=False)])
+    places = ends.searchsorted(stations, side="right")
+    return np.where(is_beside, offsets, 0.0), tuple(way[place].id for place in places.tolist())
 
 
 def evened(offsets: Floats) -> Floats:

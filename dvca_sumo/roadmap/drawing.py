@@ -22,10 +22,15 @@ class Stretch(msgspec.Struct, frozen=True, eq=False):
 class Change(msgspec.Struct, frozen=True, eq=False):
     """Between these stations the line crosses over `lanes`, from the first to the last."""
 
-    lanes: tuple[Lane, ...]
+    ways: tuple[tuple[Lane, ...], ...]  # each of the lanes, and those it leads on to beside the others, end to end
     begin: float  # [m] station
     end: float  # [m]
-    latest: float  # [m] where the lanes end
+    latest: float  # [m] where the ways end
+
+    @property
+    def lanes(self) -> tuple[Lane, ...]:
+        """Those of the edge on which the line crosses over."""
+        return tuple(way[0] for way in self.ways)
 
 
 class Drawing:
@@ -76,7 +81,7 @@ class Drawing:
         self._append(points[int(np.searchsorted(nearest, len(lanes) - 1)) :])
         end = self.length
         self._append(_cut(last.line, float(reached[-1]), last.line.length))
-        self.changes.append(Change(tuple(lanes), origin, end, self.length))
+        self.changes.append(Change(tuple((lane,) for lane in lanes), origin, end, self.length))
         return begin, self.length
 
     def _join(self, lane: Lane) -> float:

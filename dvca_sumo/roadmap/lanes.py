@@ -49,6 +49,7 @@ class Movement(msgspec.Struct, frozen=True, eq=False, gc=False):
     direction: str  # SUMO's letter: s straight, t turnaround, l, r, L, R, ...
     state: str  # SUMO's letter of right of way: M, m, =, s, w, ...
     signal_id: str | None  # "tls/linkIndex"
+    signal_group: str | None  # the same for all signals that show the same at any time
     is_drivable: bool  # for the vehicle class the map was loaded for
 
     @property

@@ -45,6 +45,18 @@ def passing_lanes(
     return tuple(found for chain in _chains(net, followed) for found in _drawn(net, chain, line, is_closed))
 
 
+def alongside(net: NetContents, movement: Movement, lane: Lane) -> Movement | None:
+    """The movement from `lane`, beside that of `movement`, which leads on beside it and is let go together with it."""
+    own, onto = net.lanes[movement.from_lane], net.lanes[movement.to_lane]
+    for other in net.movements.get(lane.id, ()):
+        to_lane = net.lanes[other.to_lane]
+        is_beside = to_lane.edge == onto.edge and to_lane.index - onto.index == lane.index - own.index
+        is_same = (other.direction, other.state) == (movement.direction, movement.state)
+        if is_beside and is_same and other.is_drivable and other.signal_group == movement.signal_group:
+            return other
+    return None
+
+
 def _chains(net: NetContents, followed: Sequence[Lane]) -> Iterator[_Chain]:
     parts: list[_Part] = []
     for own, rows in runs(followed):

@@ -43,9 +43,11 @@ def read_net(path: Path, vehicle_class: str) -> NetContents:
     edges = [edge for edge in net.getEdges() if edge.getFunction() in (*_ROAD, "crossing")]
     is_left_hand = _is_left_hand(edges)
     lanes = {lane.id: lane for edge in edges for lane in _lanes(edge, vehicle_class, is_left_hand=is_left_hand)}
-    vias = _vias(edges)
+    vias, groups = _vias(edges), _signal_groups(net)
     walking = _walking_areas(net)
-    junctions = {node.getID(): _junction(node, vias, walking[node.getID()], vehicle_class) for node in net.getNodes()}
+    junctions = {
+        node.getID(): _junction(node, vias, groups, walking[node.getID()], vehicle_class) for node in net.getNodes()
+    }
     return NetContents(
         lanes=lanes,
         edges={edge.getID(): tuple(_lane_ids(edge)) for edge in edges if not edge.getFunction()},
@@ -59,7 +61,7 @@ def _parsed(path: Path) -> Any:
     if not path.is_file():
         raise RoadMapError(f"net file not found: {path}")
     try:
-        net = sumolib.net.readNet(str(path), withInternal=True, maxcache=0)
+        net = sumolib.net.readNet(str(path), withInternal=True, withPrograms=True, maxcache=0)
     except Exception as error:  # a broken file breaks sumolib in many ways
         raise RoadMapError(f"not a SUMO net: {path} ({type(error).__name__}: {error})") from error
     if not net.getEdges(withInternal=False):
@@ -152,6 +154,16 @@ def _vias(edges: Iterable[Any]) -> dict[str, str]:
     }
 
 
+def _signal_groups(net: Any) -> dict[str, str]:
+    """By signal: what it shows in every phase of every program of its traffic light."""
+    found: dict[str, str] = {}
+    for light in net.getTrafficLights():
+        states = [phase.state for program in light.getPrograms().values() for phase in program.getPhases()]
+        shown = ("".join(letters) for letters in zip(*states, strict=False))
+        found |= {f"{light.getID()}/{index}": f"{light.getID()} {letters}" for index, letters in enumerate(shown)}
+    return found
+
+
 def _walking_areas(net: Any) -> dict[str, dict[str, Any]]:
     """Their outlines, by junction: their edges are called ":junction_wN"."""
     found: dict[str, dict[str, Any]] = defaultdict(dict)
@@ -162,12 +174,14 @@ def _walking_areas(net: Any) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _junction(node: Any, vias: dict[str, str], walking: dict[str, Any], vehicle_class: str) -> Junction:
+def _junction(
+    node: Any, vias: dict[str, str], groups: dict[str, str], walking: dict[str, Any], vehicle_class: str
+) -> Junction:
     crossings = (edge for edge in node.getIncoming() if edge.getFunction() == "crossing")
     return Junction(
         id=node.getID(),
         movements=tuple(
-            _movement(connection, index, vias, vehicle_class) for index, connection in enumerate(_links(node))
+            _movement(connection, index, vias, groups, vehicle_class) for index, connection in enumerate(_links(node))
         ),
         foes=dict(node._foes),  # noqa: SLF001 no accessor
         responses=dict(node._prohibits),  # noqa: SLF001 no accessor
@@ -191,7 +205,9 @@ def _links(node: Any) -> Iterator[Any]:
                 yield connection
 
 
-def _movement(connection: Any, index: int, vias: dict[str, str], vehicle_class: str) -> Movement:
+def _movement(
+    connection: Any, index: int, vias: dict[str, str], groups: dict[str, str], vehicle_class: str
+) -> Movement:
     to_lane = f"{connection.getTo().getID()}_{connection.getToLane().getIndex()}"
     from_lane = f"{connection.getFrom().getID()}_{connection.getFromLane().getIndex()}"
     if connection.getTo().getFunction() == "crossing":
@@ -201,7 +217,8 @@ def _movement(connection: Any, index: int, vias: dict[str, str], vehicle_class: 
     while via:
         internal.append(via)
         via = vias.get(via, "")
-    signal = connection.getTLSID()
+    light = connection.getTLSID()
+    signal = f"{light}/{connection.getTLLinkIndex()}" if light else None
     return Movement(
         junction=connection.getJunction().getID(),
         index=index,
@@ -210,7 +227,8 @@ def _movement(connection: Any, index: int, vias: dict[str, str], vehicle_class: 
         internal=tuple(internal),
         direction=connection.getDirection(),
         state=connection.getState(),
-        signal_id=f"{signal}/{connection.getTLLinkIndex()}" if signal else None,
+        signal_id=signal,
+        signal_group=groups.get(signal, signal) if signal else None,
         is_drivable=all(_allows(part, vehicle_class) for part in (connection.getToLane(), connection)),
     )
 

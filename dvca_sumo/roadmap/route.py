@@ -56,18 +56,27 @@ class Crossing(msgspec.Struct, frozen=True, eq=False):
 
 
 class LaneChange(msgspec.Struct, frozen=True, eq=False):
-    """Where the route crosses from lane to lane: drawn as early as there is room, to be done anywhere on the way."""
+    """Where the route crosses from lane to lane: drawn as early as there is room, to be done anywhere on the way.
 
-    lanes: tuple[str, ...]  # in the order of crossing, at least two
-    widths: tuple[float, ...]  # [m] of them
+    That may lead across junctions, as far as all of the lanes run on side by side, and are let go together.
+    """
+
+    lanes: tuple[tuple[str, ...], ...]  # in the order of crossing, at least two, and along each of them
+    widths: tuple[float, ...]  # [m] where they are narrowest
     start_station: float  # [m] from where the line crosses over
-    latest_station: float  # [m] where it must be over: the edge ends, or the route
+    latest_station: float  # [m] where it must be over: one of the lanes leads elsewhere, or the route ends
     stations: Floats  # (n,) [m] from start to latest
     offsets: Floats  # (lanes, n) [m] of their centres from the line, there
+    junctions: tuple[tuple[float, float], ...] = ()  # [m] where each on the way begins and ends
 
     def centres(self, stations: Floats) -> Floats:
         """(lanes, m) offsets of the lanes' centres at `stations` (m,) [m]; held before and after."""
         return np.stack([np.interp(stations, self.stations, offsets) for offsets in self.offsets])
+
+    def lane(self, station: float, which: int) -> str:
+        """One of the lanes, by its place among them, at a station [m]."""
+        row = min(max(int(self.stations.searchsorted(station, side="right")) - 1, 0), len(self.stations) - 1)
+        return self.lanes[which][row]
 
     def nearest(self, station: float, offset: float) -> int:
         """The lane, by its place in `lanes`, whose centre is nearest to a point beside the line [m]."""
@@ -153,7 +162,7 @@ class Route(msgspec.Struct, frozen=True, eq=False):
             own, aside = self.lane_ids[self.row_at(station)], offset
         else:
             nearest = change.nearest(station, offset)
-            own, aside = change.lanes[nearest], offset - float(change.centres(np.array([station]))[nearest, 0])
+            own, aside = change.lane(station, nearest), offset - float(change.centres(np.array([station]))[nearest, 0])
         if passing is not None:
             row = int(passing.stations.searchsorted(station, side="right")) - 1
             if abs(offset - float(passing.offsets[row])) < abs(aside):

@@ -68,7 +68,7 @@ class Ego:
         """
         front = self.station() + self.shape.front
         change = self.route.lane_change_at(front)
-        if change is not None and lane != change.lanes[-1]:
+        if change is not None and lane != change.lane(front, -1):
             return 1 if change.offsets[-1, 0] > change.offsets[0, 0] else -1
         if self.route.passing_lane_at(front) is not None:
             truth = self.vehicle.truth

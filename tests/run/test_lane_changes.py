@@ -56,3 +56,21 @@ def test_ego_waits_in_its_lane_when_nobody_leaves_a_gap(tmp_path: Path, plain_fi
     assert record.path[-1].speed == 0.0
     assert not any(one.kind == "collision" for one in record.violations)
     assert 400.0 < record.path[-1].x < 500.0
+
+
+def test_ego_that_finds_no_gap_before_a_junction_changes_lanes_behind_it(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    edges = EDGES.replace('id="ab" from="a"', 'id="eb" from="e"')
+    before = '<edge id="ae" from="a" to="e" numLanes="3" speed="13.9"/>'
+    connections = CONNECTIONS.replace('from="ab"', 'from="eb"')
+    net = plain_file(NODES + '<node id="e" x="200" y="0"/>', edges + before, connections)
+    parked = "".join(
+        f'<vehicle id="q{row}" depart="0" departLane="2" departPos="{195 - 8 * row}"><route edges="ae eb bd"/>'
+        f'<stop lane="ae_2" startPos="{188 - 8 * row}" endPos="{195 - 8 * row}" duration="500"/></vehicle>'
+        for row in range(24)
+    )
+    ego = '<vehicle id="ego" depart="20" departLane="1" departSpeed="max"><route edges="ae eb bd"/></vehicle>'
+    record = driven(scenario_file(tmp_path, net, parked + ego))
+    assert record.violations == []
+    assert record.ending is Ending.ARRIVED

@@ -80,7 +80,7 @@ class LaneChanger:
         is_hurried = stop.at < self._config.change_hurry * speed
         occupied = self._gaps.occupied(change, window.station, objects)
         target = self._lane
-        while target < last:
+        while target < last and not self._is_at_junction(change, window.station, speed):
             is_pressed = has_to or target < self._target
             lane = occupied[target + 1]
             if not self._gaps.is_free(lane, change, window, speed, is_pressed=is_pressed, is_hurried=is_hurried):
@@ -95,6 +95,13 @@ class LaneChanger:
             return LaneChoice(behind=behind)
         pace = self._gaps.pace(occupied[target + 1], change, window, speed)
         return LaneChoice(keeping(change, target, window, stop), behind, pace)
+
+    def _is_at_junction(self, change: LaneChange, station: float, speed: float) -> bool:
+        """Whether a change begun now would be made on a junction."""
+        shape = self._shape
+        way = blend_length(max(change.widths), max(speed, LAST_SPEED), self._config)
+        low, high = station - shape.rear_overhang, station + shape.front + way
+        return any(begin < high and end > low for begin, end in change.junctions)
 
 
 def keeping(change: LaneChange, lane: int, window: Window, stop: Stop) -> Keeping:

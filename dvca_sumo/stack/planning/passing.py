@@ -115,4 +115,4 @@ def _way_back(passing: PassingLane) -> LaneChange:
     """From the lane to pass on to the route's own, anywhere along it."""
     offsets = np.stack((passing.offsets, np.zeros_like(passing.offsets)))
     first, last = float(passing.stations[0]), float(passing.stations[-1])
-    return LaneChange(passing.lane_ids[:1] * 2, passing.widths, first, last, passing.stations, offsets)
+    return LaneChange((passing.lane_ids,) * 2, passing.widths, first, last, passing.stations, offsets)

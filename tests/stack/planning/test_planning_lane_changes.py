@@ -27,7 +27,7 @@ def crossing_over(lanes: int = 1) -> Route:
     over = np.interp(along, np.hypot(np.diff(stations, prepend=0.0), np.diff(line, prepend=0.0)).cumsum(), line)
     rows = (along >= START) & (along <= LATEST)
     change = LaneChange(
-        lanes=tuple(f"ego_{lane}" for lane in range(lanes + 1)),
+        lanes=tuple((f"ego_{lane}",) * int(rows.sum()) for lane in range(lanes + 1)),
         widths=(WIDTH,) * (lanes + 1),
         start_station=START,
         latest_station=LATEST,
