@@ -110,12 +110,15 @@ def _at_line(distance: float, label: str, config: PlanningConfig) -> Stop:
 def _obstacle(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> int | None:
     """The nearest future that stands in the way, as a row; not one that the front bumper has cleared already.
 
-    In the way is also what leaves the path no room between its bounds, and what the body, beside it, would touch.
+    In the way is also what leaves the path no room between its bounds, and what the body, beside it, would touch:
+    people nearly so.
     """
     scene, blocker = graph.scene, blocking(graph, shape, config)
     still = slice(scene.moving, None)
     low = graph.low[still, 0]
-    is_beside = graph.occupied[still, 0] & (low <= shape.front) & (graph.gaps[still, 0] < 0.0)
+    is_person = scene.classes[scene.owners[still]] == _PERSON
+    nearest = np.where(is_person, config.person_least, 0.0)
+    is_beside = graph.occupied[still, 0] & (low <= shape.front) & (graph.gaps[still, 0] < nearest)
     if is_beside.any():
         is_beside[is_beside] = ~_is_behind(graph, scene.owners[still][is_beside], shape)
     in_way = is_beside | (graph.occupied[still, 0] & (low > shape.front))

@@ -172,6 +172,15 @@ def test_road_is_not_left_on_the_way_to_where_it_is_wider() -> None:
     assert later.fronts[-1] > 140.0
 
 
+@pytest.mark.parametrize("x", [20.5, 22.0, 23.5])
+def test_ego_does_not_start_past_a_person_who_has_come_to_stand_right_beside_it(x: float) -> None:
+    close = person(5, x, -1.35, heading=math.pi / 2.0, speed=-1.3, leaves=6.0)
+    driven = drive(road(), 15.0, station=20.0, actors=[close])
+    assert driven.clearances[0] < 0.25
+    assert driven.speeds[:60].max() < 0.1
+    assert driven.fronts[-1] > 40.0
+
+
 @pytest.mark.parametrize("beside", [-1.35, -1.0])
 def test_lane_that_gets_narrower_is_not_left_for_who_walks_along_it(beside: float) -> None:
     straight = road(limit=8.0, lanes_left=1)
