@@ -1,7 +1,6 @@
 """The path decision: around what stands in the way, on which side and by how much, or not at all."""
 
-import math
-from collections.abc import Container
+from collections.abc import Container, Iterator
 
 import msgspec
 import numpy as np
@@ -12,10 +11,10 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length, feasible_length
 from dvca_sumo.stack.planning.reference import Window
+from dvca_sumo.stack.planning.room import room_beside, tightened
 from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags, Scene
 
 _VEHICLE, _PERSON, _STATIC = (int(kind) for kind in (ObjectClass.VEHICLE, ObjectClass.PEDESTRIAN, ObjectClass.STATIC))
-_OVER_LINE = 0.1  # [m] over the lane marking is not yet another lane
 _COMMITTED = 0.5  # of the offset: from there on it is safer to go on than to go back
 _DRIVING = 1.0  # [s] of moving: what is seen first may seem to move for less
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane
@@ -96,70 +95,39 @@ class NudgeDecider:
         return Plateau(begin, max(end, begin), offset)
 
     def _offset(self, blocker: Blocker, situation: Situation) -> float | None:
-        """The offset to pass at: on the side of the last cycle if that still works, else the smaller one.
-
-        While there is no room beside for the wanted clearance, the room that the lane leaves will do if it is enough,
-        or else the least clearance. None where there is no way round, or where none is needed.
-        """
-        window, begin, end = situation.window, blocker.low - self._shape.front, blocker.high + self._shape.rear_overhang
-        blend = blend_length(blocker.wanted, situation.speed, self._config)
-        whole = window.span(max(begin - 0.5 * blend, 0.0), end + 0.5 * blend)
-        if blocker.walks:  # may be met where the lane is wider than on the way there
-            begin = max(begin - blend, 0.0)
-        span = window.span(begin, end)
-        lane_left = float((window.lane_left - window.swept_left)[span].min()) + _OVER_LINE
-        lane_right = float((window.lane_right - window.swept_right)[span].max()) - _OVER_LINE
-        held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
-        offsets = self._candidates(blocker, window, whole)
-        hold = self._config.nudge_hold
-        begun = 0.0 if lane_right - hold <= held <= lane_left + hold else held
-        turns_in = self._turns_in(blocker, situation)
-        offsets.sort(key=lambda offset: (offset * held <= 0.0, abs(offset)))
-        open_sides = [offset for offset in offsets if not self._meets_another(blocker, offset, situation.scene)]
-        for offset in open_sides:
-            stays_in_lane = offset == 0.0 or (lane_right <= offset <= lane_left and not turns_in)
-            if stays_in_lane or self._may_leave_lane(blocker, offset, begun, situation):
-                is_same = abs(offset - held) < hold and self._clears(blocker, held)
-                return (held if is_same else offset) or None
-        if lane_right <= lane_left and not turns_in and (blocker.walks or self._will_stay(blocker, situation)):
-            for offset in (min(max(offset, lane_right), lane_left) for offset in offsets):
-                if self._clears(blocker, offset) and not self._meets_another(blocker, offset, situation.scene):
-                    return offset or None
-        for offset in (self._tight(blocker, offset) for offset in open_sides):
-            if not self._meets_another(blocker, offset, situation.scene) and self._may_leave_lane(
-                blocker, offset, begun, situation
-            ):
-                return offset
+        """The offset to pass at; None where there is no way round, or where none is needed."""
+        for offset in self._choices(blocker, situation):
+            if not self._meets_another(blocker, offset, situation.scene):
+                return offset or None
         return None
 
-    def _tight(self, blocker: Blocker, offset: float) -> float:
-        """The offset on the same side that leaves the least clearance."""
-        return offset - math.copysign(blocker.clearance(offset) - self._config.nudge_clearance_least, offset)
+    def _choices(self, blocker: Blocker, situation: Situation) -> Iterator[float]:
+        """Offsets to pass at, best first: on the side of the last cycle if that still works, else the smaller one.
 
-    def _candidates(self, blocker: Blocker, window: Window, span: slice) -> list[float]:
-        """At most one offset to the left and one to the right: the wanted clearance, or what road and wheels allow."""
-        edge, least = self._config.edge_clearance, self._config.nudge_clearance_least
-        inward_left, inward_right = self._steerable(window.curvatures[span])
-        leftmost = max(min(float((window.road_left - window.swept_left)[span].min()) - edge, inward_left), 0.0)
-        rightmost = min(max(float((window.road_right - window.swept_right)[span].max()) + edge, inward_right), 0.0)
-        touches_left, touches_right = blocker.left - blocker.swept_right, blocker.right - blocker.swept_left
-        left = min(max(touches_left + blocker.wanted, 0.0), leftmost)
-        right = max(min(touches_right - blocker.wanted, 0.0), rightmost)
-        offsets = []
-        if left - touches_left >= least:
-            offsets.append(left)
-        if touches_right - right >= least:
-            offsets.append(right)
-        return offsets
-
-    def _steerable(self, curvatures: Floats) -> tuple[float, float]:
-        """How far into bends of the line the wheels turn the ego, to the left and to the right [m]."""
-        tightest = self._shape.wheelbase / math.tan(self._config.steering)
-        left, right = float(curvatures.max(initial=0.0)), float(curvatures.min(initial=0.0))
-        return (
-            1.0 / left - tightest if left > 0.0 else math.inf,
-            1.0 / right + tightest if right < 0.0 else -math.inf,
-        )
+        While there is no room beside for the wanted clearance, the room that the lane leaves will do if it is enough,
+        or else the least clearance.
+        """
+        hold = self._config.nudge_hold
+        room = room_beside(blocker, situation.window, situation.speed, self._shape, self._config)
+        held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
+        begun = 0.0 if room.is_in_lane(held, hold) else held
+        turns_in = self._turns_in(blocker, situation)
+        wanted = sorted(room.wanted, key=lambda offset: (offset * held <= 0.0, abs(offset)))
+        for offset in wanted:
+            stays_in_lane = offset == 0.0 or (room.is_in_lane(offset) and not turns_in)
+            if stays_in_lane or self._may_leave_lane(blocker, offset, begun, situation):
+                if abs(offset - held) < hold and self._clears(blocker, held):
+                    yield held
+                yield offset
+        has_lane = room.lane_right <= room.lane_left and not turns_in
+        if has_lane and (blocker.walks or self._will_stay(blocker, situation)):
+            inside = (min(max(offset, room.lane_right), room.lane_left) for offset in wanted)
+            yield from (offset for offset in inside if self._clears(blocker, offset))
+        for offset in wanted:
+            if not self._meets_another(blocker, offset, situation.scene):
+                tight = tightened(blocker, offset, self._config)
+                if self._may_leave_lane(blocker, tight, begun, situation):
+                    yield tight
 
     def _clears(self, blocker: Blocker, offset: float) -> bool:
         return blocker.clearance(offset) >= self._config.nudge_clearance_least
