@@ -38,17 +38,21 @@ def ahead(graph: Graph, shape: VehicleShape) -> Ahead:
     return Ahead(rears, fronts, ways[chosen] < _CREEPS, scene.classes[owners] != _PERSON)
 
 
-def is_blocked(view: LineView, those: Ahead, speed: float, shape: VehicleShape, config: PlanningConfig) -> bool:
-    """Whether the ego, at `speed` [m/s], is to wait at a line it has not passed for the junction behind it to clear.
+def is_blocked(
+    view: LineView, distance: float, those: Ahead, speed: float, shape: VehicleShape, config: PlanningConfig
+) -> bool:
+    """Whether the ego, at `speed` [m/s], is to wait at a place it has not passed for the junction behind it to clear.
+
+    That place, `distance` [m] ahead of the front bumper, is the line, or where one lets others pass on the junction.
 
     It is when one of `those` stands on the junction who is no vehicle: vehicles there go on. And when it would not fit
     between the junction and the first one who stands beyond it, after all who drive there before the ego have
     closed up. It is not any more where it could hardly stop.
     """
-    line, distance = view.line, view.distance
+    line = view.line
     if not line.crosses or distance <= 0.0 or speed * speed > 2.0 * _BRAKING * distance:
         return False
-    leave = distance + line.exit_station - line.station
+    leave = view.distance + line.exit_station - line.station
     if (those.stands & ~those.is_vehicle & (those.rears > distance) & (those.rears <= leave)).any():
         return True
     beyond = those.stands & (those.rears > leave)

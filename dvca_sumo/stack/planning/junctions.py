@@ -11,6 +11,7 @@ from dvca_sumo.stack.planning.watching import WatchList
 _AHEAD = 200.0  # [m] lines further away are not looked at
 _OVERRUN = 0.5  # [m] the front bumper may be past a line and still wait at it
 _STANDING = 0.2  # [m/s]
+_AT_PLACE = 1.3  # [m] past the place to let others pass, the ego may still wait there
 _AT_LINE = 4.0  # [m] before the line, where standing counts as having stopped at it
 _ROLLING = 2.0  # [m/s] below this speed the ego always manages to stop at a red light
 _NOBODY: frozenset[str] = frozenset()
@@ -26,6 +27,11 @@ class LineView(NamedTuple):
     stop: str | None  # why the ego must not cross it, if it must not
     goes_first: frozenset[str]  # lanes whose traffic has priority
     waiting_distance: float  # [m] from the front bumper to where it is let pass
+
+    @property
+    def may_wait(self) -> bool:
+        """Whether the ego has not yet passed that place, or is still at it."""
+        return self.waiting_distance > -_AT_PLACE
 
 
 class Junctions:

@@ -1,6 +1,7 @@
 """What bounds the speed whoever has the right of way: limits, curves, narrow gaps, and places to stop at."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from dvca_sumo.messages import Integers, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Control
 from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.exits import ahead, is_blocked
+from dvca_sumo.stack.planning.exits import Ahead, ahead, is_blocked
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.reference import BEHIND
 from dvca_sumo.stack.planning.scene import ALONG, Flags
@@ -25,6 +26,8 @@ _BESIDE = 3.0  # [m] sideways
 _AT_LINE = 4.0  # [m] before or past it
 _SLOWED = 4.0  # [m/s]
 _SLOW_MOVER = 3.0  # [m/s] faster ones are not passed slowly
+_OCCUPIED = "stop exit occupied"
+_HERE = 0.1  # [m] is as near to a place as being at it
 _GIVE_AT_DESTINATION = 1.0  # [m]
 _GIVE_AT_OBJECT = 1.0  # [m] of the distance to it is never spent
 
@@ -98,9 +101,21 @@ def nearest_stop(
         stops.append(Stop(occupied_from - gap, config.object_gap - _GIVE_AT_OBJECT, label))
     if views:
         those = ahead(graph, shape)
-        blocked = [view.distance for view in views if is_blocked(view, those, speed, shape, config)]
-        stops += [_at_line(distance, "stop exit occupied", config) for distance in blocked]
+        for view in views:
+            stops += _before_blocked(view, those, speed, shape, config)
     return min(stops, key=lambda stop: stop.at)
+
+
+def _before_blocked(
+    view: LineView, those: Ahead, speed: float, shape: VehicleShape, config: PlanningConfig
+) -> Iterator[Stop]:
+    """At the line, and at the place on the junction where others are let pass, if there is one."""
+    if is_blocked(view, view.distance, those, speed, shape, config):
+        yield _at_line(view.distance, _OCCUPIED, config)
+    place = view.waiting_distance
+    is_inside = place > view.distance and view.may_wait
+    if is_inside and is_blocked(view, max(place, _HERE), those, speed, shape, config):
+        yield Stop(place, config.stop_line_gap, _OCCUPIED)
 
 
 def _at_line(distance: float, label: str, config: PlanningConfig) -> Stop:

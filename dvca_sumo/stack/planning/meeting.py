@@ -25,7 +25,6 @@ _SLOW = 4.0  # [m/s] no faster, an ego stops for people who come up to its side:
 _BESIDE_PERSON = 1.0  # ... [m] behind its front bumper, and all along it ...
 _BRUSHING = 0.2  # ... for those who would come so near to it [m]
 _CLEAR_GAP = 0.5  # [m] lengthwise behind somebody who has passed
-_AT_PLACE = 1.3  # [m] past the place to let others pass, the ego may still wait there
 
 
 class Demand(msgspec.Struct, frozen=True):
@@ -177,6 +176,6 @@ class Meetings:
         at = nearest - gap - front
         for view in views:
             leave = view.distance + view.line.exit_station - view.line.station
-            if view.distance - 1.0 <= nearest - front <= leave and view.waiting_distance > -_AT_PLACE:
+            if view.distance - 1.0 <= nearest - front <= leave and view.may_wait:
                 at = min(at, view.waiting_distance)
         return Stop(at, nearest - HARD_GAP - front - at, f"yield {graph.track(row)}", until)
