@@ -449,9 +449,7 @@ def test_ego_that_waits_on_the_junction_stays_at_its_place_while_a_person_stands
     route = road(stop_lines=[stop_line(100.0, Control.SIGNAL, waiting_station=104.0)])
     stream = [car(k, 108.0, -40.0 - 22.0 * k, heading=UP, speed=8.0, lanes=("major_0",)) for k in range(1, 4)]
     comes = person(9, 111.0, -9.0, heading=UP, speed=1.0, leaves=3.0, stays_from=12.0)
-    driven = drive(
-        route, 25.0, speed=8.0, actors=[*stream, comes], signals=lambda _: {"J/2": SignalColour.PERMISSIVE}
-    )
+    driven = drive(route, 25.0, speed=8.0, actors=[*stream, comes], signals=lambda _: {"J/2": SignalColour.PERMISSIVE})
     assert driven.speeds[-1] == 0.0
     assert 102.0 < driven.fronts[-1] < 104.5
 
