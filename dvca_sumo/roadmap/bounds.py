@@ -69,9 +69,7 @@ def lane_change(line: Polyline, change: Change, junctions: Iterable[tuple[float,
 
 def _way_beside(line: Polyline, way: Sequence[Lane], rows: slice) -> tuple[Floats, tuple[str, ...]]:
     """Offsets of lanes that lead from one to the next from the points `rows` of `line` [m], and which lane it is."""
-    whole = Polyline(np.concatenate([lane.line.points for lane in way]))
-    offsets, is_beside = beside(line, whole, rows)
-    stations, _ = whole.project(line.points[rows])
+    offsets, is_beside, stations = beside(line, joined(way), rows)
     gaps = [math.dist(lane.line.points[-1], after.line.points[0]) for lane, after in itertools.pairwise(way)]
     ends = np.cumsum([lane.line.length + gap for lane, gap in zip(way, gaps, strict=False)])
     places = ends.searchsorted(stations, side="right")
@@ -97,17 +95,25 @@ def _put(found: Bounds, lanes: Mapping[str, Lane], line: Polyline, lane: Lane, r
 
 def _centre(line: Polyline, lane: Lane, rows: slice) -> Floats:
     """Offset of the lane's centre from the line; 0 where the lane does not reach (curves joining lanes)."""
-    offsets, is_beside = beside(line, lane.line, rows)
+    offsets, is_beside, _ = beside(line, lane.line, rows)
     return np.where(is_beside, offsets, 0.0)
 
 
-def beside(line: Polyline, other: Polyline, rows: slice) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """Offsets of `other` from the points `rows` of `line` [m], and where it is beside them at all."""
+def joined(lanes: Iterable[Lane]) -> Polyline:
+    """The centre line of lanes that lead from one to the next."""
+    return Polyline(np.concatenate([lane.line.points for lane in lanes]))
+
+
+def beside(line: Polyline, other: Polyline, rows: slice) -> tuple[Floats, npt.NDArray[np.bool_], Floats]:
+    """Offsets of `other` from the points `rows` of `line` [m], where it is beside them at all, and its stations there.
+
+    Stations are on `other` [m].
+    """
     points, headings = line.points[rows], line.headings[rows]
     stations, _ = other.project(points)
     gaps = other.poses(stations)[:, :2] - points
     offsets = gaps[:, 1] * np.cos(headings) - gaps[:, 0] * np.sin(headings)
-    return offsets, (stations > 0.0) & (stations < other.length)
+    return offsets, (stations > 0.0) & (stations < other.length), stations
 
 
 def _beside(lanes: Mapping[str, Lane], lane: Lane, side: str) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dvca_sumo.geometry.polyline import Polyline
-from dvca_sumo.roadmap.bounds import beside, evened
+from dvca_sumo.roadmap.bounds import beside, evened, joined
 from dvca_sumo.roadmap.lanes import Lane, Movement
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.route import PassingLane
@@ -43,18 +43,6 @@ def passing_lanes(
 ) -> tuple[PassingLane, ...]:
     """By station; the points of `line` follow the lanes `followed`, and where `is_closed` (n,) nobody may pass."""
     return tuple(found for chain in _chains(net, followed) for found in _drawn(net, chain, line, is_closed))
-
-
-def alongside(net: NetContents, movement: Movement, lane: Lane) -> Movement | None:
-    """The movement from `lane`, beside that of `movement`, which leads on beside it and is let go together with it."""
-    own, onto = net.lanes[movement.from_lane], net.lanes[movement.to_lane]
-    for other in net.movements.get(lane.id, ()):
-        to_lane = net.lanes[other.to_lane]
-        is_beside = to_lane.edge == onto.edge and to_lane.index - onto.index == lane.index - own.index
-        is_same = (other.direction, other.state) == (movement.direction, movement.state)
-        if is_beside and is_same and other.is_drivable and other.signal_group == movement.signal_group:
-            return other
-    return None
 
 
 def _chains(net: NetContents, followed: Sequence[Lane]) -> Iterator[_Chain]:
@@ -97,7 +85,7 @@ def _movement(net: NetContents, lane: Lane, onto: Lane) -> Movement | None:
 def _drawn(net: NetContents, chain: _Chain, line: Polyline, is_closed: npt.NDArray[np.bool_]) -> Iterator[PassingLane]:
     parts = chain.parts
     rows = slice(parts[0].rows.start, parts[-1].rows.stop)
-    offsets, is_beside = beside(line, _way(net, parts), rows)
+    offsets, is_beside, _ = beside(line, joined(_way(net, parts)), rows)
     lane_ids = _lane_ids(parts)
     widths = (min(part.lane.width for part in parts), min(part.own.width for part in parts))
     stations = line.stations[rows]
@@ -120,11 +108,9 @@ def _lane_ids(parts: Sequence[_Part]) -> list[str]:
     return ids
 
 
-def _way(net: NetContents, parts: Sequence[_Part]) -> Polyline:
+def _way(net: NetContents, parts: Sequence[_Part]) -> Iterator[Lane]:
     """The lanes to pass on, end to end."""
-    shapes = []
     for part in parts:
         if part.before is not None:
-            shapes += [net.lanes[lane].line.points for lane in part.before.internal]
-        shapes.append(part.lane.line.points)
-    return Polyline(np.concatenate(shapes))
+            yield from (net.lanes[lane] for lane in part.before.internal)
+        yield part.lane

@@ -1,6 +1,5 @@
 """From a list of edges to a Route: choose lanes, draw them, smooth the line, note what lies along it."""
 
-import math
 from collections.abc import Iterator, Sequence
 
 import msgspec
@@ -10,9 +9,10 @@ from dvca_sumo.geometry.polyline import Floats, Polyline
 from dvca_sumo.roadmap.areas import area_of, widened
 from dvca_sumo.roadmap.bounds import Bounds, bounds, lane_change
 from dvca_sumo.roadmap.drawing import Change, Drawing, Stretch
+from dvca_sumo.roadmap.extending import extended
 from dvca_sumo.roadmap.lane_sequence import Leg, change_length, lane_sequence
 from dvca_sumo.roadmap.lanes import Lane, Movement
-from dvca_sumo.roadmap.passing import alongside, passing_lanes
+from dvca_sumo.roadmap.passing import passing_lanes
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.right_of_way import crossings, stop_line
 from dvca_sumo.roadmap.route import Route, RouteError, UnmappedLimit
@@ -23,7 +23,6 @@ from dvca_sumo.roadmap.steering import PART, WHOLE, steered, straying, unsteerab
 _BEFORE = 20.0  # [m] of lane shown behind the start, as far as there is any
 _RUN_UP = 10.0  # [m] of line behind the start in any case: the rear axle needs a line under it
 _BEYOND = 100.0  # [m] shown behind the destination, as far as the net goes on
-_TURN = 1.2  # [rad]
 _SETTLED = 10.0  # [m] at most is waited before a lane change, after a junction or the start
 
 
@@ -136,7 +135,7 @@ def _drawn(net: NetContents, legs: Sequence[Leg], start: float, arrival: float) 
         line=line,
         stretches=tuple(drawing.stretches),
         changes=tuple(
-            _extended(net, change, legs[order:], [end for _, end in spans[order:]])
+            extended(net, change, legs[order:], [end for _, end in spans[order:]])
             for order, change in zip(crossed, drawing.changes, strict=True)
         ),
         passages=tuple(passages),
@@ -158,34 +157,6 @@ def _continued(net: NetContents, legs: Sequence[Leg], distance: float) -> Iterat
         leg = Leg(net.lanes[movement.to_lane], net.lanes[movement.to_lane], None)
         distance -= leg.exit.line.length + sum(net.lanes[lane].line.length for lane in movement.internal)
     yield leg
-
-
-def _extended(net: NetContents, change: Change, legs: Sequence[Leg], ends: Sequence[float]) -> Change:
-    """A change on the first of `legs`, with where its lanes run on side by side; the legs end at `ends` [m].
-
-    That is up to the last one with room to change lanes, before the next change and before a turn.
-    """
-    found, ways = change, change.ways
-    for leg, following, end in zip(legs, legs[1:], ends[1:], strict=False):
-        if leg.movement is None or following.entry is not following.exit or _turns(leg.exit, following.entry):
-            break
-        onward = [alongside(net, leg.movement, way[-1]) for way in ways]
-        movements = [movement for movement in onward if movement is not None]
-        if len(movements) < len(ways):
-            break
-        ways = tuple(
-            (*way, *(net.lanes[lane] for lane in (*movement.internal, movement.to_lane)))
-            for way, movement in zip(ways, movements, strict=True)
-        )
-        if following.entry.line.length >= change_length(following.entry, len(ways) - 1):
-            found = msgspec.structs.replace(change, ways=ways, latest=end)
-    return found
-
-
-def _turns(lane: Lane, onto: Lane) -> bool:
-    """Whether the way from one lane to the other is a turn: lanes are not beside each other on all of it."""
-    angle = float(onto.line.headings[0] - lane.line.headings[-1])
-    return abs(math.remainder(angle, 2.0 * math.pi)) > _TURN
 
 
 def _draw_leg(net: NetContents, drawing: Drawing, leg: Leg, begin: float, end: float) -> tuple[float, float]:

@@ -23,8 +23,8 @@ CONNECTIONS = """
 <connection from="bc" to="ce" fromLane="0" toLane="0"/><connection from="bc" to="cd" fromLane="1" toLane="0"/>"""
 
 
-def change(roadmap: RoadMap, edges: str = "ab bc cd") -> LaneChange:
-    (found,) = roadmap.route(edges.split(), "ab_0", 20.0, None, 200.0).lane_changes
+def change(roadmap: RoadMap) -> LaneChange:
+    (found,) = roadmap.route(["ab", "bc", "cd"], "ab_0", 20.0, None, 200.0).lane_changes
     return found
 
 
