@@ -53,11 +53,11 @@ def lane_change(line: Polyline, change: Change, junctions: Iterable[tuple[float,
     """Where the lanes of `change`, whose stations are on `line`, run beside it; likewise all `junctions` on the way."""
     first, last = np.searchsorted(line.stations, (change.begin, change.latest))
     rows = slice(int(first), max(int(last), int(first)) + 1)
-    beside_line = [_way_beside(line, way, rows) for way in change.ways]
-    offsets = np.stack([evened(centres) for centres, _ in beside_line])
+    beside_line = [way_beside(line, way, rows) for way in change.ways]
+    offsets = np.stack([evened(np.where(is_there, centres, 0.0)) for centres, is_there, _ in beside_line])
     offsets.setflags(write=False)
     return LaneChange(
-        lanes=tuple(ids for _, ids in beside_line),
+        lanes=tuple(ids for _, _, ids in beside_line),
         widths=tuple(min(lane.width for lane in way) for way in change.ways),
         start_station=change.begin,
         latest_station=change.latest,
@@ -67,13 +67,18 @@ def lane_change(line: Polyline, change: Change, junctions: Iterable[tuple[float,
     )
 
 
-def _way_beside(line: Polyline, way: Sequence[Lane], rows: slice) -> tuple[Floats, tuple[str, ...]]:
-    """Offsets of lanes that lead from one to the next from the points `rows` of `line` [m], and which lane it is."""
-    offsets, is_beside, stations = beside(line, joined(way), rows)
+def way_beside(
+    line: Polyline, way: Sequence[Lane], rows: slice
+) -> tuple[Floats, npt.NDArray[np.bool_], tuple[str, ...]]:
+    """Offsets of lanes that lead from one to the next from the points `rows` of `line` [m]; where they are; which.
+
+    Where they are not beside the line, the offset is that of their end.
+    """
+    offsets, is_beside, stations = _beside(line, Polyline(np.concatenate([lane.line.points for lane in way])), rows)
     gaps = [math.dist(lane.line.points[-1], after.line.points[0]) for lane, after in itertools.pairwise(way)]
     ends = np.cumsum([lane.line.length + gap for lane, gap in zip(way, gaps, strict=False)])
     places = ends.searchsorted(stations, side="right")
-    return np.where(is_beside, offsets, 0.0), tuple(way[place].id for place in places.tolist())
+    return offsets, is_beside, tuple(way[place].id for place in places.tolist())
 
 
 def evened(offsets: Floats) -> Floats:
@@ -88,23 +93,18 @@ def _put(found: Bounds, lanes: Mapping[str, Lane], line: Polyline, lane: Lane, r
     centre = _centre(line, lane, rows)
     left, right = centre + 0.5 * lane.width, centre - 0.5 * lane.width
     margin = _JUNCTION_MARGIN if lane.is_internal else 0.0
-    sides = (left, right, left + _beside(lanes, lane, "left") + margin, right - _beside(lanes, lane, "right") - margin)
+    sides = (left, right, left + _room(lanes, lane, "left") + margin, right - _room(lanes, lane, "right") - margin)
     for array, side, widest in zip(msgspec.structs.astuple(found), sides, (np.maximum, np.minimum) * 2, strict=True):
         array[rows] = side if is_first else widest(array[rows], side)
 
 
 def _centre(line: Polyline, lane: Lane, rows: slice) -> Floats:
     """Offset of the lane's centre from the line; 0 where the lane does not reach (curves joining lanes)."""
-    offsets, is_beside, _ = beside(line, lane.line, rows)
+    offsets, is_beside, _ = _beside(line, lane.line, rows)
     return np.where(is_beside, offsets, 0.0)
 
 
-def joined(lanes: Iterable[Lane]) -> Polyline:
-    """The centre line of lanes that lead from one to the next."""
-    return Polyline(np.concatenate([lane.line.points for lane in lanes]))
-
-
-def beside(line: Polyline, other: Polyline, rows: slice) -> tuple[Floats, npt.NDArray[np.bool_], Floats]:
+def _beside(line: Polyline, other: Polyline, rows: slice) -> tuple[Floats, npt.NDArray[np.bool_], Floats]:
     """Offsets of `other` from the points `rows` of `line` [m], where it is beside them at all, and its stations there.
 
     Stations are on `other` [m].
@@ -116,7 +116,7 @@ def beside(line: Polyline, other: Polyline, rows: slice) -> tuple[Floats, npt.ND
     return offsets, (stations > 0.0) & (stations < other.length), stations
 
 
-def _beside(lanes: Mapping[str, Lane], lane: Lane, side: str) -> float:
+def _room(lanes: Mapping[str, Lane], lane: Lane, side: str) -> float:
     """Width of all lanes on that side which the ego may use [m]."""
     width = 0.0
     neighbour = getattr(lane, side)

@@ -1,4 +1,4 @@
-"""How far on a lane change may still be done: where its lanes run on side by side, over junctions, too."""
+"""Lanes that run on side by side over junctions, and how far on a lane change may thus still be done."""
 
 import math
 from collections.abc import Sequence
@@ -20,9 +20,9 @@ def extended(net: NetContents, change: Change, legs: Sequence[Leg], ends: Sequen
     """
     found, ways = change, change.ways
     for leg, following, end in zip(legs, legs[1:], ends[1:], strict=False):
-        if leg.movement is None or following.entry is not following.exit or _turns(leg.exit, following.entry):
+        if leg.movement is None or following.entry is not following.exit:
             break
-        onward = [_alongside(net, leg.movement, way[-1]) for way in ways]
+        onward = [alongside(net, leg.movement, way[-1]) for way in ways]
         movements = [movement for movement in onward if movement is not None]
         if len(movements) < len(ways):
             break
@@ -35,15 +35,14 @@ def extended(net: NetContents, change: Change, legs: Sequence[Leg], ends: Sequen
     return found
 
 
-def _turns(lane: Lane, onto: Lane) -> bool:
-    """Whether the way from one lane to the other is a turn."""
-    angle = float(onto.line.headings[0] - lane.line.headings[-1])
-    return abs(math.remainder(angle, 2.0 * math.pi)) > _TURN
+def alongside(net: NetContents, movement: Movement, lane: Lane) -> Movement | None:
+    """The movement from `lane`, beside that of `movement`, which leads on beside it and is let go together with it.
 
-
-def _alongside(net: NetContents, movement: Movement, lane: Lane) -> Movement | None:
-    """The movement from `lane`, beside that of `movement`, which leads on beside it and is let go together with it."""
+    There is none along a turn.
+    """
     own, onto = net.lanes[movement.from_lane], net.lanes[movement.to_lane]
+    if abs(math.remainder(float(onto.line.headings[0] - own.line.headings[-1]), 2.0 * math.pi)) > _TURN:
+        return None
     for other in net.movements.get(lane.id, ()):
         to_lane = net.lanes[other.to_lane]
         is_beside = to_lane.edge == onto.edge and to_lane.index - onto.index == lane.index - own.index

@@ -1,17 +1,18 @@
 """Lanes to pass on: where the next lane, on the side of the faster ones, runs along with a route.
 
-It is one to pass on until it ends or the route parts from it: where the route changes lanes, turns, gives way to
-others or crosses a pedestrian crossing.
+It is one to pass on until it ends or the route parts from it: where the route changes lanes or turns, or the lane leads
+elsewhere. At pedestrian crossings, and on junctions where somebody may have to wait, nobody begins to pass; who is on
+the lane goes on along it.
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
 
 import msgspec
-import numpy as np
-import numpy.typing as npt
 
 from dvca_sumo.geometry.polyline import Polyline
-from dvca_sumo.roadmap.bounds import beside, evened, joined
+from dvca_sumo.roadmap.bounds import evened, way_beside
+from dvca_sumo.roadmap.extending import alongside
 from dvca_sumo.roadmap.lanes import Lane, Movement
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.route import PassingLane
@@ -21,47 +22,58 @@ _SHORTEST = 100.0  # [m]
 _FIRST = "M"  # SUMO's letter for movements that give way to nobody
 _STRAIGHT = "s"
 
+Span = tuple[float, float]  # [m] from station to station
+
+
+class Way(msgspec.Struct, frozen=True, eq=False):
+    """A trip, as lanes to pass on are looked for along it."""
+
+    line: Polyline
+    followed: Sequence[Lane]  # by point of the line
+    movements: Sequence[Movement]  # that it takes
+    trip: Span
+    changes: Sequence[Span]  # of lanes
+    crossings: Sequence[Span]  # for people
+
 
 class _Part(msgspec.Struct, frozen=True, eq=False):
     """A lane to pass on, beside a lane of the route."""
 
     own: Lane
     lane: Lane
-    before: Movement | None  # from the part before
+    before: Sequence[Movement]  # from the part before
+    is_plain: bool  # they lead straight on, and nobody has to give way there
     rows: slice  # of the line that follow `own`
 
 
-class _Chain(msgspec.Struct, frozen=True, eq=False):
+def passing_lanes(net: NetContents, way: Way) -> tuple[PassingLane, ...]:
+    """By station."""
+    return tuple(found for parts in _chains(net, way) for found in _drawn(net, parts, way))
+
+
+def _chains(net: NetContents, way: Way) -> Iterator[list[_Part]]:
     """Parts that lead from one to the next."""
-
-    parts: list[_Part]
-    leads_on: bool
-
-
-def passing_lanes(
-    net: NetContents, line: Polyline, followed: Sequence[Lane], is_closed: npt.NDArray[np.bool_]
-) -> tuple[PassingLane, ...]:
-    """By station; the points of `line` follow the lanes `followed`, and where `is_closed` (n,) nobody may pass."""
-    return tuple(found for chain in _chains(net, followed) for found in _drawn(net, chain, line, is_closed))
-
-
-def _chains(net: NetContents, followed: Sequence[Lane]) -> Iterator[_Chain]:
     parts: list[_Part] = []
-    for own, rows in runs(followed):
+    taken = 0
+    for own, rows in runs(way.followed):
         if own.is_internal:
             continue
+        ways = _until(net, own.edge, way.movements[taken:])
+        taken += len(ways)
         lane = _faster(net, own)
-        before = None
-        if parts and lane is not None and _movement(net, parts[-1].own, own):
-            before = _movement(net, parts[-1].lane, lane)
-        if before is None and parts:
-            onto = (net.lanes[movement.to_lane] for movement in net.movements.get(parts[-1].lane.id, ()))
-            yield _Chain(parts, any(lane.edge == own.edge and lane.is_drivable for lane in onto))
+        part = None if lane is None else _part(net, parts, own, lane, ways, rows)
+        if parts and (part is None or not part.before):
+            yield parts
             parts = []
-        if lane is not None:
-            parts.append(_Part(own, lane, before, rows))
+        if part is not None:
+            parts.append(part)
     if parts:
-        yield _Chain(parts, leads_on=True)
+        yield parts
+
+
+def _until(net: NetContents, edge: str, movements: Sequence[Movement]) -> list[Movement]:
+    """The first ones, up to that from `edge`."""
+    return list(itertools.takewhile(lambda one: net.lanes[one.from_lane].edge != edge, movements))
 
 
 def _faster(net: NetContents, lane: Lane) -> Lane | None:
@@ -73,44 +85,59 @@ def _faster(net: NetContents, lane: Lane) -> Lane | None:
     return None
 
 
-def _movement(net: NetContents, lane: Lane, onto: Lane) -> Movement | None:
-    """The way straight on from `lane`, on which one gives way to nobody."""
-    for movement in net.movements.get(lane.id, ()):
-        if movement.to_lane == onto.id and movement.is_drivable:
-            is_first = movement.state == _FIRST and movement.signal_id is None
-            return movement if is_first and movement.direction == _STRAIGHT else None
-    return None
+def _part(
+    net: NetContents, parts: Sequence[_Part], own: Lane, lane: Lane, ways: Sequence[Movement], rows: slice
+) -> _Part:
+    """Continuing the last one of `parts`, from where the route takes `ways`, if it leads on beside them."""
+    before: list[Movement] = []
+    came_by = parts[-1].lane if parts else None
+    for movement in ways:
+        onward = None if came_by is None else alongside(net, movement, came_by)
+        if onward is None:
+            return _Part(own, lane, (), False, rows)
+        before.append(onward)
+        came_by = net.lanes[onward.to_lane]
+    is_plain = all(
+        one.state == _FIRST and one.signal_id is None and one.direction == _STRAIGHT for one in (*ways, *before)
+    )
+    return _Part(own, lane, before if came_by is lane else (), is_plain, rows)
 
 
-def _drawn(net: NetContents, chain: _Chain, line: Polyline, is_closed: npt.NDArray[np.bool_]) -> Iterator[PassingLane]:
-    parts = chain.parts
+def _drawn(net: NetContents, parts: Sequence[_Part], way: Way) -> Iterator[PassingLane]:
+    line = way.line
     rows = slice(parts[0].rows.start, parts[-1].rows.stop)
-    offsets, is_beside, _ = beside(line, joined(_way(net, parts)), rows)
-    lane_ids = _lane_ids(parts)
+    offsets, is_there, lane_ids = way_beside(line, list(_lanes(net, parts)), rows)
     widths = (min(part.lane.width for part in parts), min(part.own.width for part in parts))
     stations = line.stations[rows]
-    for is_open, run in runs((is_beside & ~is_closed[rows]).tolist()):
+    is_there &= (stations >= way.trip[0]) & (stations <= way.trip[1])
+    for begin, end in way.changes:
+        is_there &= (stations <= begin) | (stations >= end)
+    halts = sorted((*_junctions(parts, line), *way.crossings))
+    for is_open, run in runs(is_there.tolist()):
         if is_open and stations[run][-1] - stations[run][0] >= _SHORTEST:
+            first, last = stations[run][[0, -1]].tolist()
             found = evened(offsets[run])
             found.setflags(write=False)
-            yield PassingLane(tuple(lane_ids[run]), widths, stations[run], found, chain.leads_on)
+            yield PassingLane(
+                lane_ids=lane_ids[run],
+                widths=widths,
+                stations=stations[run],
+                offsets=found,
+                leads_on=last + 1.0 > way.trip[1],
+                halts=tuple((begin, end) for begin, end in halts if begin < last and end > first),
+            )
 
 
-def _lane_ids(parts: Sequence[_Part]) -> list[str]:
-    """By row of the line; on a junction the first lane there."""
-    ids: list[str] = []
-    first = parts[0].rows.start
-    for part in parts:
-        if part.before is not None:
-            crossed = part.before.internal[0] if part.before.internal else part.lane.id
-            ids += [crossed] * (part.rows.start - first - len(ids))
-        ids += [part.lane.id] * (part.rows.stop - part.rows.start)
-    return ids
+def _junctions(parts: Sequence[_Part], line: Polyline) -> Iterator[Span]:
+    """Where junctions are on which somebody may have to wait."""
+    for before, part in itertools.pairwise(parts):
+        if not part.is_plain:
+            yield float(line.stations[before.rows.stop - 1]), float(line.stations[part.rows.start])
 
 
-def _way(net: NetContents, parts: Sequence[_Part]) -> Iterator[Lane]:
+def _lanes(net: NetContents, parts: Sequence[_Part]) -> Iterator[Lane]:
     """The lanes to pass on, end to end."""
-    for part in parts:
-        if part.before is not None:
-            yield from (net.lanes[lane] for lane in part.before.internal)
-        yield part.lane
+    yield parts[0].lane
+    for part in parts[1:]:
+        for movement in part.before:
+            yield from (net.lanes[lane] for lane in (*movement.internal, movement.to_lane))

@@ -84,13 +84,18 @@ class LaneChange(msgspec.Struct, frozen=True, eq=False):
 
 
 class PassingLane(msgspec.Struct, frozen=True, eq=False):
-    """A lane beside the route's own for a while, all along which the ego may pass who is slow, and come back."""
+    """A lane beside the route's own for a while, along which the ego may pass who is slow, and come back.
+
+    Where it leads on to the destination the ego may stay on it. A queue before another end may be for where the ego
+    goes.
+    """
 
     lane_ids: tuple[str, ...]  # (n,) junctions that it runs across make it more than one
     widths: tuple[float, float]  # [m] of it and of the route's own, where they are narrowest
     stations: Floats  # (n,) [m]
     offsets: Floats  # (n,) [m] of its centre from the line
-    leads_on: bool  # where the route goes afterwards, too: a queue on the route's own lane alone is for another way
+    leads_on: bool
+    halts: tuple[tuple[float, float], ...] = ()  # [m] where one may have to wait on the way: from there to there
 
     def covers(self, station: float) -> bool:
         """Whether it is there at `station` [m]."""

@@ -12,7 +12,7 @@ from dvca_sumo.roadmap.drawing import Change, Drawing, Stretch
 from dvca_sumo.roadmap.extending import extended
 from dvca_sumo.roadmap.lane_sequence import Leg, change_length, lane_sequence
 from dvca_sumo.roadmap.lanes import Lane, Movement
-from dvca_sumo.roadmap.passing import passing_lanes
+from dvca_sumo.roadmap.passing import Way, passing_lanes
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.right_of_way import crossings, stop_line
 from dvca_sumo.roadmap.route import Route, RouteError, UnmappedLimit
@@ -68,10 +68,14 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
     changes = [change for change in _changes(plan, line, along) if change.latest > change.begin]
     crossed = tuple(crossing for p in passages for crossing in crossings(net, p.movement, line, p.begin, p.end))
     departure, destination = moved(plan.start), moved(plan.destination)
-    is_closed = (line.stations < departure) | (line.stations > destination)
-    busy = [(one.begin, one.end) for one in changes] + [(one.start_station, one.end_station) for one in crossed]
-    for low, high in busy:
-        is_closed |= (line.stations >= low) & (line.stations <= high)
+    way = Way(
+        line=line,
+        followed=followed,
+        movements=[passage.movement for passage in passages],
+        trip=(departure, destination),
+        changes=[(change.begin, change.end) for change in changes],
+        crossings=[(one.start_station, one.end_station) for one in crossed],
+    )
     return Route(
         line=line,
         lane_ids=tuple(lane.id for lane in followed),
@@ -92,7 +96,7 @@ def route(net: NetContents, edges: Sequence[str], start: tuple[str, float], arri
             if not lane.is_limit_mapped
         ),
         lane_changes=tuple(lane_change(line, change, [(p.begin, p.end) for p in passages]) for change in changes),
-        passing_lanes=passing_lanes(net, line, followed, is_closed),
+        passing_lanes=passing_lanes(net, way),
     )
 
 

@@ -34,6 +34,7 @@ def test_the_next_lane_runs_along_over_junctions_from_start_to_destination(plain
     (passing,) = found.passing_lanes
     assert lanes_of(passing) == ["ab_1", "bc_1", "cd_1"]
     assert passing.leads_on
+    assert passing.halts == ()
     assert passing.stations[0] == pytest.approx(found.start, abs=1.0)
     assert passing.stations[-1] == pytest.approx(found.destination, abs=1.0)
     assert np.allclose(passing.offsets, 3.2, atol=0.05)
@@ -57,11 +58,36 @@ def test_from_the_fastest_lane_nobody_passes(plain: NetBuilder) -> None:
     ],
     ids=["signals", "dark signals"],
 )
-def test_it_ends_where_there_are_signals(plain: NetBuilder, nodes: str) -> None:
-    first, second = route(plain(nodes, EDGES, CONNECTIONS), "ab bc cd").passing_lanes
+def test_it_leads_on_over_junctions_where_one_may_have_to_wait(plain: NetBuilder, nodes: str) -> None:
+    found = route(plain(nodes, EDGES, CONNECTIONS), "ab bc cd")
+    (passing,) = found.passing_lanes
+    assert lanes_of(passing) == ["ab_1", "bc_1", "cd_1"]
+    assert passing.leads_on
+    (line,) = [line for line in found.stop_lines if line.lane == "bc_0"]
+    (halt,) = passing.halts
+    assert halt == pytest.approx((line.station, line.exit_station), abs=1.0)
+
+
+def test_it_ends_where_lanes_are_let_go_apart(plain: NetBuilder) -> None:
+    """The next lane turns left as well, against oncoming traffic: its signals are others."""
+    nodes = NODES.replace('x="600" y="0"', 'x="600" y="0" type="traffic_light"') + '<node id="g" x="600" y="200"/>'
+    edges = EDGES + '<edge id="dc" from="d" to="c"/><edge id="cg" from="c" to="g"/>'
+    connections = CONNECTIONS.replace('<connection from="bc" to="cd" fromLane="1" toLane="1"/>', "")
+    connections += '<connection from="bc" to="cg" fromLane="1" toLane="0"/><connection from="dc" to="cg"/>'
+    first, second = route(plain(nodes, edges, connections), "ab bc cd").passing_lanes
     assert lanes_of(first) == ["ab_1", "bc_1"]
-    assert first.leads_on
+    assert not first.leads_on
     assert lanes_of(second) == ["cd_1"]
+
+
+def test_it_leads_on_over_an_edge_that_is_too_short_for_the_line(plain: NetBuilder) -> None:
+    nodes = NODES + '<node id="x" x="601" y="0"/>'
+    edges = EDGES.replace('id="cd" from="c"', 'id="xd" from="x"') + '<edge id="cx" from="c" to="x" numLanes="2"/>'
+    connections = CONNECTIONS.replace('to="cd"', 'to="cx"')
+    connections += "".join(f'<connection from="cx" to="xd" fromLane="{n}" toLane="{n}"/>' for n in (0, 1))
+    (passing,) = route(plain(nodes, edges, connections), "ab bc cx xd").passing_lanes
+    assert {"ab_1", "bc_1", "xd_1"} <= set(lanes_of(passing))
+    assert passing.leads_on
 
 
 def test_a_lane_that_is_closed_to_the_ego_is_none_to_pass_on(plain: NetBuilder) -> None:
@@ -82,13 +108,14 @@ def test_nobody_passes_while_changing_lanes(plain: NetBuilder) -> None:
     assert change.start_station < passing.stations[0] < change.latest_station
 
 
-def test_nobody_passes_on_a_pedestrian_crossing(grid: NetBuilder) -> None:
+def test_nobody_begins_to_pass_at_a_pedestrian_crossing(grid: NetBuilder) -> None:
     roadmap = grid("--default.lanenumber=2", "--sidewalks.guess", "--crossings.guess")
     found = route(roadmap, "A1B1 B1C1", "A1B1_1")
-    middles = [0.5 * (crossing.start_station + crossing.end_station) for crossing in found.crossings]
-    assert middles
+    spans = [(crossing.start_station, crossing.end_station) for crossing in found.crossings]
+    assert spans
     assert found.passing_lanes
-    assert not any(passing.covers(middle) for passing in found.passing_lanes for middle in middles)
+    for passing in found.passing_lanes:
+        assert {span for span in spans if passing.covers(span[0])} <= set(passing.halts)
 
 
 def test_the_lane_that_a_body_beside_the_line_is_on(plain: NetBuilder) -> None:

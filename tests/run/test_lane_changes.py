@@ -74,3 +74,34 @@ def test_ego_that_finds_no_gap_before_a_junction_changes_lanes_behind_it(
     record = driven(scenario_file(tmp_path, net, parked + ego))
     assert record.violations == []
     assert record.ending is Ending.ARRIVED
+
+
+def test_ego_passes_a_queue_that_turns_off_and_goes_on_past_the_signals(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    nodes = "".join(
+        f'<node id="{name}" x="{x}" y="{y}"{kind}/>'
+        for name, x, y, kind in (
+            ("a", 0, 0, ""),
+            ("b", 600, 0, ' type="traffic_light"'),
+            ("c", 1000, 0, ""),
+            ("d", 600, -300, ""),
+        )
+    )
+    edges = "".join(
+        f'<edge id="{name}" from="{name[0]}" to="{name[1]}" numLanes="{lanes}" speed="13.9"/>'
+        for name, lanes in (("ab", 2), ("bc", 2), ("bd", 1), ("db", 1))
+    )
+    connections = "".join(
+        f'<connection from="{one}" to="{to}" fromLane="{lane}" toLane="{onto}"/>'
+        for one, to, lane, onto in (("ab", "bd", 0, 0), ("ab", "bc", 0, 0), ("ab", "bc", 1, 1), ("db", "bc", 0, 0))
+    )
+    parked = "".join(
+        f'<vehicle id="q{row}" depart="0" departLane="0" departPos="{588 - 8 * row}"><route edges="ab bd"/>'
+        f'<stop lane="ab_0" startPos="{581 - 8 * row}" endPos="{588 - 8 * row}" duration="500"/></vehicle>'
+        for row in range(40)
+    )
+    ego = '<vehicle id="ego" depart="20" departLane="0" departSpeed="max"><route edges="ab bc"/></vehicle>'
+    record = driven(scenario_file(tmp_path, plain_file(nodes, edges, connections), parked + ego))
+    assert record.violations == []
+    assert record.ending is Ending.ARRIVED

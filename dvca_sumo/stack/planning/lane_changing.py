@@ -30,7 +30,7 @@ class Keeping(msgspec.Struct, frozen=True, eq=False):
 
     offsets: Floats  # (n,) of its centre from the window's line [m]
     width: float  # [m]
-    stop: Stop  # before the way to the route's lane would be too short; places along the window's line
+    stop: Stop | None  # before the way to the route's lane is too short; places along the window's line
 
 
 class LaneChoice(msgspec.Struct, frozen=True, eq=False):
@@ -80,7 +80,8 @@ class LaneChanger:
         is_hurried = stop.at < self._config.change_hurry * speed
         occupied = self._gaps.occupied(change, window.station, objects)
         target = self._lane
-        while target < last and not self._is_at_junction(change, window.station, speed):
+        waits = is_at_junction(change, window, speed, self._shape, self._config)
+        while target < last and (target < self._target or not waits):
             is_pressed = has_to or target < self._target
             lane = occupied[target + 1]
             if not self._gaps.is_free(lane, change, window, speed, is_pressed=is_pressed, is_hurried=is_hurried):
@@ -96,15 +97,8 @@ class LaneChanger:
         pace = self._gaps.pace(occupied[target + 1], change, window, speed)
         return LaneChoice(keeping(change, target, window, stop), behind, pace)
 
-    def _is_at_junction(self, change: LaneChange, station: float, speed: float) -> bool:
-        """Whether a change begun now would be made on a junction."""
-        shape = self._shape
-        way = blend_length(max(change.widths), max(speed, LAST_SPEED), self._config)
-        low, high = station - shape.rear_overhang, station + shape.front + way
-        return any(begin < high and end > low for begin, end in change.junctions)
 
-
-def keeping(change: LaneChange, lane: int, window: Window, stop: Stop) -> Keeping:
+def keeping(change: LaneChange, lane: int, window: Window, stop: Stop | None) -> Keeping:
     """Keeping to one of the lanes of `change`, by its place in them."""
     stations = window.station + np.arange(window.rows.shape[1]) - BEHIND
     offsets = np.interp(stations, change.stations, change.offsets[lane])
@@ -131,6 +125,15 @@ def last_stop(
     if at + 0.5 * way < speed * speed / (2.0 * config.comfort_braking):
         return Stop(change.latest_station - config.stop_line_gap - here, config.stop_line_gap, _WAITING)
     return Stop(at, 0.5 * way, _WAITING)
+
+
+def is_at_junction(
+    change: LaneChange, window: Window, speed: float, shape: VehicleShape, config: PlanningConfig
+) -> bool:
+    """Whether a change begun now would be made on a junction."""
+    way = blend_length(max(change.widths), max(speed, LAST_SPEED), config)
+    low, high = window.station - shape.rear_overhang, window.station + shape.front + way
+    return any(begin < high and end > low for begin, end in change.junctions)
 
 
 def goes_on(aside: float, width: float, lane: Neighbours, shape: VehicleShape) -> bool:

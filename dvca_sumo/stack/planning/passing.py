@@ -15,6 +15,7 @@ from dvca_sumo.stack.planning.lane_changing import (
     ARRIVED,
     LaneChoice,
     goes_on,
+    is_at_junction,
     is_last_chance,
     keeping,
     last_stop,
@@ -52,9 +53,11 @@ class Passing:
         self, way: LaneChange, window: Window, offset: float, speed: float, objects: TrackedObjects
     ) -> LaneChoice | None:
         config, shape = self._config, self._shape
+        leads_on = self._lanes[self._next].leads_on
+        nose = window.station + shape.front
         wanted = config.cruise_fraction * float(window.speed_limits[BEHIND])
-        left = way.latest_station - window.station - shape.front
-        is_short = left < config.passing_room * wanted
+        halt = min((begin for begin, end in way.junctions if end > nose), default=way.latest_station)
+        is_short = halt - nose < config.passing_room * wanted
         if self._lane == self._target == _OWN and is_short:
             return None
         aside = np.abs(offset - way.centres(np.array([window.station]))[:, 0])
@@ -63,24 +66,26 @@ class Passing:
         if self._lane == self._target == _OWN and (is_short or aside[_OWN] > ARRIVED):
             return None
         occupied = self._gaps.occupied(way, window.station, objects)
-        stop = last_stop(way, window, 1, speed, shape, config)
-        is_late = left < config.return_room * speed
+        stop = None if leads_on else last_stop(way, window, 1, speed, shape, config)
+        is_late = not leads_on and way.latest_station - nose < config.return_room * speed
         beside = self._pace_on(occupied[_BESIDE], wanted, _LONGER * config.passing_outlook, is_own=False)
         own = self._pace_on(occupied[_OWN], wanted, config.passing_outlook, is_own=True)
         is_queue = own < config.passing_slowest
         wish = target = self._wish(beside, own, is_late=is_late, is_queue=is_queue)
         if target != self._lane:
-            is_pressed = self._lane != self._target or is_last_chance(stop, speed)
+            is_under_way = self._lane != self._target
+            is_pressed = is_under_way or (stop is not None and is_last_chance(stop, speed))
             is_begun = goes_on(float(aside[self._lane]), way.widths[self._lane], occupied[target], shape)
             is_pulling_out = target == _BESIDE != self._target
             may_begin = is_begun or (
-                self._gaps.is_free(occupied[target], way, window, speed, is_pressed=is_pressed)
+                (is_under_way or not is_at_junction(way, window, speed, shape, config))
+                and self._gaps.is_free(occupied[target], way, window, speed, is_pressed=is_pressed)
                 and (not is_pulling_out or self._gaps.is_in_sight(occupied[_OWN], occupied[_BESIDE], wanted, speed))
             )
             if not may_begin:
                 target = self._lane
         pace = math.inf
-        if target != wish and (is_late or is_queue):
+        if target != wish and (is_late or (is_queue and wish == _BESIDE)):
             pace = self._gaps.pace(occupied[wish], way, window, speed)
         behind = letting_in([occupied[target]], shape) if target != self._lane else frozenset()
         self._target = target
@@ -115,4 +120,12 @@ def _way_back(passing: PassingLane) -> LaneChange:
     """From the lane to pass on to the route's own, anywhere along it."""
     offsets = np.stack((passing.offsets, np.zeros_like(passing.offsets)))
     first, last = float(passing.stations[0]), float(passing.stations[-1])
-    return LaneChange((passing.lane_ids,) * 2, passing.widths, first, last, passing.stations, offsets)
+    return LaneChange(
+        lanes=(passing.lane_ids,) * 2,
+        widths=passing.widths,
+        start_station=first,
+        latest_station=last,
+        stations=passing.stations,
+        offsets=offsets,
+        junctions=passing.halts,
+    )

@@ -146,7 +146,7 @@ class Planner:
         leader = leader_of(leaders, graph, shape)
         to_destination = self._destination - graph.window.station - shape.front
         stops = [nearest_stop(to_destination, start.speed, graph, views, shape, config)]
-        if choice.keeping is not None:
+        if choice.keeping is not None and choice.keeping.stop is not None:
             stops.append(choice.keeping.stop)
         if choice.pace < math.inf:
             caps = [min(cap, choice.pace) for cap in caps]

@@ -12,7 +12,9 @@ WIDTH = 3.2  # [m] of a lane
 END = 900.0  # [m] of the lane to pass on
 
 
-def beside(*, leads_on: bool = True, end: float = END, side: int = 1) -> Route:
+def beside(
+    *, leads_on: bool = True, end: float = END, side: int = 1, halts: tuple[tuple[float, float], ...] = ()
+) -> Route:
     """Straight along x, with a lane to pass on at the left (side 1) or right (-1)."""
     found = road(straight_points(1200.0), lanes_left=1 if side > 0 else 0)
     if side < 0:
@@ -24,13 +26,14 @@ def beside(*, leads_on: bool = True, end: float = END, side: int = 1) -> Route:
         stations=stations,
         offsets=np.full(len(stations), side * WIDTH),
         leads_on=leads_on,
+        halts=halts,
     )
     return msgspec.structs.replace(found, passing_lanes=(lane,))
 
 
-def queue(speed: float) -> list[Actor]:
+def queue(speed: float, count: int = 12) -> list[Actor]:
     """Cars that creep along the ego's lane from 300 m on."""
-    return [car(1000 + number, 300.0 + 8.0 * number, speed=speed) for number in range(12)]
+    return [car(1000 + number, 300.0 + 8.0 * number, speed=speed) for number in range(count)]
 
 
 def lanes(driven: Drive) -> list[int]:
@@ -98,10 +101,28 @@ def test_beside_dense_traffic_it_slows_down_in_time_for_a_gap_past_the_queue() -
 
 
 def test_it_comes_back_before_its_lane_to_pass_on_ends() -> None:
-    driven = drive(beside(end=400.0), 60.0, speed=13.0, actors=[car(7, 80.0, speed=10.0), car(8, 100.0, speed=10.0)])
+    slow = [car(7, 80.0, speed=10.0), car(8, 100.0, speed=10.0)]
+    driven = drive(beside(end=400.0, leads_on=False), 60.0, speed=13.0, actors=slow)
     assert lanes(driven) == [0, 1, 0]
     over = driven.fronts[np.abs(driven.states[:, 2]) > 0.5 * WIDTH]
     assert over.max() < 400.0
+    assert driven.clearances.min() > 1.0
+
+
+def test_nobody_is_passed_shortly_before_a_junction() -> None:
+    driven = drive(beside(halts=((200.0, 215.0),)), 60.0, speed=13.0, actors=[car(7, 80.0, speed=8.5)])
+    assert lanes(driven) == [0, 1, 0]
+    first = np.flatnonzero(np.abs(driven.states[:, 2]) > 0.5)[0]
+    assert driven.fronts[first] - SHAPE.length > 215.0
+
+
+def test_beside_a_queue_it_goes_on_over_a_junction() -> None:
+    junction = (480.0, 495.0)
+    driven = drive(beside(halts=(junction,)), 60.0, speed=13.0, actors=queue(1.0, 36))
+    assert lanes(driven) == [0, 1, 0]
+    assert driven.speeds.min() > 8.0
+    is_on = (driven.fronts > junction[0]) & (driven.fronts - SHAPE.length < junction[1])
+    assert np.abs(driven.states[is_on, 2] - WIDTH).max() < 0.4
     assert driven.clearances.min() > 1.0
 
 
