@@ -19,6 +19,7 @@ from dvca_sumo.roadmap.route import PassingLane
 from dvca_sumo.roadmap.runs import runs
 
 _SHORTEST = 100.0  # [m]
+_NEAR = 3.0  # [m] before the destination one is there
 _FIRST = "M"  # SUMO's letter for movements that give way to nobody
 _STRAIGHT = "s"
 
@@ -123,7 +124,7 @@ def _drawn(net: NetContents, parts: Sequence[_Part], way: Way) -> Iterator[Passi
                 widths=widths,
                 stations=stations[run],
                 offsets=found,
-                leads_on=last + 1.0 > way.trip[1],
+                leads_on=last + _NEAR > way.trip[1],
                 halts=tuple((begin, end) for begin, end in halts if begin < last and end > first),
             )
 
