@@ -66,11 +66,11 @@ def blockers(
     swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
     near = now.gaps(swept_left, swept_right) < wanted + config.nudge_hold * is_held
     near &= scene.is_standing | is_beside | walks
-    met = _met(now.stations, np.where(walks, scene.speeds * now.directions, 0.0), speed)
+    met = _met(now.stations, np.where(walks, scene.speeds * now.directions, 0.0), speed, config.acceleration)
     near &= now.stations + now.half_lengths > -shape.rear_overhang - LENGTHWISE
     near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
     lows = np.minimum(now.stations, met) - now.half_lengths
-    highs = np.maximum(now.stations, met) + now.half_lengths
+    highs = met + now.half_lengths
     found = [
         Blocker(
             scene.ids[row],
@@ -96,8 +96,12 @@ def _walks_along(scene: Scene) -> Flags:
     return along
 
 
-def _met(stations: Floats, speeds: Floats, speed: float) -> Floats:
-    """Where an ego at `speed` [m/s] meets those who go on from `stations` at `speeds` [m/s] along its way (n,) [m]."""
-    closing = np.maximum(max(speed, SLOWEST) - speeds, SLOWEST)
-    met: Floats = stations + speeds * np.maximum(stations, 0.0) / closing
+def _met(stations: Floats, speeds: Floats, speed: float, acceleration: float) -> Floats:
+    """Where an ego at `speed` [m/s] meets those who go on from `stations` at `speeds` [m/s] along its way (n,) [m].
+
+    It gets faster at `acceleration` [m/s^2] until then.
+    """
+    closing = speed - speeds
+    times = (np.sqrt(closing * closing + 2.0 * acceleration * np.maximum(stations, 0.0)) - closing) / acceleration
+    met: Floats = stations + speeds * times
     return met

@@ -73,8 +73,9 @@ class NudgeDecider:
         nudges = []
         for blocker in blockers(scene, situation.window, situation.speed, self._held, self._shape, self._config):
             offset = self._offset(blocker, situation)
-            if offset is not None:
-                nudges.append(Nudge(blocker.track, self._plateau(blocker, offset, situation)))
+            plateau = None if offset is None else self._plateau(blocker, offset, situation)
+            if plateau is not None:
+                nudges.append(Nudge(blocker.track, plateau))
         self._held = {
             nudge.track: Plateau(station + begin, station + end, offset)
             for nudge in nudges
@@ -82,8 +83,11 @@ class NudgeDecider:
         }
         return nudges
 
-    def _plateau(self, blocker: Blocker, offset: float, situation: Situation) -> Plateau:
-        """Where the offset has to be reached and left; a move once begun later than that ends where it did before."""
+    def _plateau(self, blocker: Blocker, offset: float, situation: Situation) -> Plateau | None:
+        """Where the offset has to be reached and left; None where who walks is met before it can be.
+
+        A move once begun later than that ends where it did before.
+        """
         begin = blocker.low - self._shape.front - LENGTHWISE
         end = blocker.high + self._shape.rear_overhang + LENGTHWISE
         end += blocker.speed * end / max(situation.speed - blocker.speed, SLOWEST)
@@ -92,6 +96,8 @@ class NudgeDecider:
             begin = max(begin, held.begin - situation.window.station)
         else:
             begin = max(begin, feasible_length(situation.lateral, offset, begin, situation.speed, self._config))
+            if blocker.walks and begin > blocker.high:
+                return None
         return Plateau(begin, max(end, begin), offset)
 
     def _offset(self, blocker: Blocker, situation: Situation) -> float | None:

@@ -181,6 +181,15 @@ def test_ego_does_not_start_past_a_person_who_has_come_to_stand_right_beside_it(
     assert driven.fronts[-1] > 40.0
 
 
+@pytest.mark.parametrize("ahead", [1.0, 2.0, 3.0])
+def test_no_room_is_made_for_who_is_met_before_there_can_be_any(ahead: float) -> None:
+    walker = person(5, 20.0 + SHAPE.front + ahead, -1.7, heading=math.pi, speed=1.7)
+    driven = drive(road(limit=8.0), 10.0, station=20.0, actors=[walker])
+    assert driven.clearances.min() > 0.35
+    assert offsets(driven)[1] < 0.1
+    assert driven.fronts[-1] > 60.0
+
+
 @pytest.mark.parametrize("beside", [-1.35, -1.0])
 def test_lane_that_gets_narrower_is_not_left_for_who_walks_along_it(beside: float) -> None:
     straight = road(limit=8.0, lanes_left=1)
