@@ -1,9 +1,12 @@
 """Stop lines ahead: who goes first by signal, sign and rule, and where the ego has to stand for it."""
 
 from bisect import bisect_left
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from dvca_sumo.messages import SignalColour, TrackedObjects
+import msgspec
+
+from dvca_sumo.messages import SignalColour, TrackedObjects, VehicleShape
 from dvca_sumo.roadmap.route import Control, Route, StopLine
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.watching import WatchList
@@ -15,6 +18,7 @@ _AT_PLACE = 1.3  # [m] past the place to let others pass, the ego may still wait
 _AT_LINE = 4.0  # [m] before the line, where standing counts as having stopped at it
 _ROLLING = 2.0  # [m/s] below this speed the ego always manages to stop at a red light
 _NOBODY: frozenset[str] = frozenset()
+_BY_RULE = frozenset({Control.YIELD, Control.PRIORITY, Control.RIGHT_BEFORE_LEFT})
 _GREENS = (SignalColour.GREEN, SignalColour.PERMISSIVE)
 _MERGE_REACH = 10.0  # [m] past the junction, where traffic from other approaches still joins
 
@@ -37,15 +41,15 @@ class LineView(NamedTuple):
 class Junctions:
     """Reads signals and signs along the route; remembers what was decided at each line until it is passed."""
 
-    def __init__(self, route: Route, config: PlanningConfig) -> None:
+    def __init__(self, route: Route, shape: VehicleShape, config: PlanningConfig) -> None:
         self._config = config
-        self._lines = route.stop_lines
-        self._exits = [line.exit_station for line in route.stop_lines]
+        self._lines = _with_room_between(route.stop_lines, shape.length)
+        self._exits = [line.exit_station for line in self._lines]
         self._seen: dict[str, tuple[float, SignalColour]] = {}
         self._entered: set[int] = set()  # lines crossed on yellow, for which it was too late to stop
         self._standing: dict[int, float] = {}  # since when the ego stands at a line
         self._released: set[int] = set()  # lines at which standing was enough
-        self._watching = [WatchList(line.stop_signs, config) for line in route.stop_lines]
+        self._watching = [WatchList(line.stop_signs, config) for line in self._lines]
 
     def step(
         self,
@@ -130,6 +134,34 @@ class Junctions:
         if time - self._standing.get(index, time) >= wait:
             self._released.add(index)
         return index in self._released
+
+
+def _with_room_between(lines: Sequence[StopLine], length: float) -> list[StopLine]:
+    """The lines, those of unsignalled junctions as one where there are not even `length` [m] to stand in between."""
+    found: list[StopLine] = []
+    last = 0  # row of the last one with anybody to meet
+    for line in lines:
+        if not found or not line.crosses:
+            found.append(line)
+            continue
+        before = found[last]
+        is_one = before.crosses and {before.control, line.control} <= _BY_RULE
+        if is_one and line.station - before.exit_station < length:
+            found[last:] = [_as_one(before, line)]
+        else:
+            last = len(found)
+            found.append(line)
+    return found
+
+
+def _as_one(first: StopLine, second: StopLine) -> StopLine:
+    return msgspec.structs.replace(
+        first,
+        control=second.control if first.control is Control.PRIORITY else first.control,
+        yields_to=first.yields_to | second.yields_to,
+        crosses=first.crosses | second.crosses,
+        exit_station=second.exit_station,
+    )
 
 
 def has_priority(views: list[LineView], near: float, far: float, lanes: tuple[str, ...]) -> bool | None:

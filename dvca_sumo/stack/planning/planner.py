@@ -49,7 +49,7 @@ class Planner:
         self._shape = shape
         self._reference = Reference(route, shape, config)
         self._destination = stop_station(route, config)
-        self._junctions = Junctions(route, config)
+        self._junctions = Junctions(route, shape, config)
         self._lane_changer = LaneChanger(route, shape, config)
         self._passing = Passing(route, shape, config)
         self._nudging = NudgeDecider(shape, config)

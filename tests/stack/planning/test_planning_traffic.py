@@ -222,6 +222,22 @@ def test_car_with_priority_from_a_side_road_is_yielded_to() -> None:
     assert_drivable(driven)
 
 
+@pytest.mark.parametrize(("between", "waits_at"), [(0.5, 100.0), (12.0, 124.0)])
+def test_ego_waits_before_two_junctions_with_no_room_to_stand_in_between(between: float, waits_at: float) -> None:
+    first = stop_line(100.0, Control.PRIORITY, yields_to=frozenset(), crosses=frozenset({"minor_0"}))
+    second = stop_line(112.0 + between, Control.YIELD)
+    stream = [
+        car(3 + row, 118.0 + between, -45.0 - 25.0 * row, heading=UP, speed=10.0, lanes=("major_0",))
+        for row in range(8)
+    ]
+    driven = drive(road(stop_lines=[first, second]), 35.0, station=60.0, speed=8.0, actors=stream)
+    stands = driven.speeds < 0.2
+    assert stands.any()
+    assert driven.fronts[stands] == pytest.approx(waits_at - 0.8, abs=0.5)
+    assert driven.fronts[-1] > 150.0
+    assert driven.clearances.min() > 1.0
+
+
 @pytest.mark.parametrize("ahead", [30.0, 40.0, 50.0])
 @pytest.mark.parametrize("radius", [10.0, 12.0])
 def test_ego_half_way_round_a_left_turn_waits_for_who_comes_past_it_and_then_across(
