@@ -22,7 +22,7 @@ def extended(net: NetContents, change: Change, legs: Sequence[Leg], ends: Sequen
     for leg, following, end in zip(legs, legs[1:], ends[1:], strict=False):
         if leg.movement is None or following.entry is not following.exit:
             break
-        onward = [alongside(net, leg.movement, way[-1]) for way in ways]
+        onward = [alongside(net, leg.movement, way[-1], _TURN) for way in ways]
         movements = [movement for movement in onward if movement is not None]
         if len(movements) < len(ways):
             break
@@ -35,13 +35,13 @@ def extended(net: NetContents, change: Change, legs: Sequence[Leg], ends: Sequen
     return found
 
 
-def alongside(net: NetContents, movement: Movement, lane: Lane) -> Movement | None:
+def alongside(net: NetContents, movement: Movement, lane: Lane, turn: float) -> Movement | None:
     """The movement from `lane`, beside that of `movement`, which leads on beside it and is let go together with it.
 
-    There is none along a turn.
+    There is none along a way that turns by more than `turn` [rad].
     """
     own, onto = net.lanes[movement.from_lane], net.lanes[movement.to_lane]
-    if abs(math.remainder(float(onto.line.headings[0] - own.line.headings[-1]), 2.0 * math.pi)) > _TURN:
+    if abs(math.remainder(float(onto.line.headings[0] - own.line.headings[-1]), 2.0 * math.pi)) > turn:
         return None
     for other in net.movements.get(lane.id, ()):
         to_lane = net.lanes[other.to_lane]

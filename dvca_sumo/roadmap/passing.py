@@ -20,6 +20,7 @@ from dvca_sumo.roadmap.runs import runs
 
 _SHORTEST = 100.0  # [m]
 _NEAR = 3.0  # [m] before the destination one is there
+_BEND = 0.5  # [rad] on junctions: in sharper ones lanes come close to each other, and drivers cut across
 _FIRST = "M"  # SUMO's letter for movements that give way to nobody
 _STRAIGHT = "s"
 
@@ -93,7 +94,7 @@ def _part(
     before: list[Movement] = []
     came_by = parts[-1].lane if parts else None
     for movement in ways:
-        onward = None if came_by is None else alongside(net, movement, came_by)
+        onward = None if came_by is None else alongside(net, movement, came_by, _BEND)
         if onward is None:
             return _Part(own, lane, (), False, rows)
         before.append(onward)

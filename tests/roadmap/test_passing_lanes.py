@@ -121,3 +121,12 @@ def test_nobody_begins_to_pass_at_a_pedestrian_crossing(grid: NetBuilder) -> Non
 def test_the_lane_that_a_body_beside_the_line_is_on(plain: NetBuilder) -> None:
     found = route(plain(NODES, EDGES, CONNECTIONS), "ab bc cd")
     assert [found.lane_at(200.0, offset) for offset in (0.0, 1.5, 1.7, 4.0)] == ["ab_0", "ab_0", "ab_1", "ab_1"]
+
+
+def test_it_ends_where_the_junction_bends(plain: NetBuilder) -> None:
+    """Where lanes turn side by side they come close to each other."""
+    nodes = NODES.replace('<node id="d" x="900" y="0"/>', '<node id="d" x="850" y="170"/>')
+    first, second = route(plain(nodes, EDGES, CONNECTIONS), "ab bc cd").passing_lanes
+    assert lanes_of(first) == ["ab_1", "bc_1"]
+    assert not first.leads_on
+    assert lanes_of(second) == ["cd_1"]
