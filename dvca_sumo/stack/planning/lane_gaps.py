@@ -158,7 +158,7 @@ class Gaps:
         """The place behind somebody on the lane that is the easiest to get to, if there is one."""
         config, shape = self._config, self._shape
         wanted = lane.rears - config.change_gap - headway * speed  # for the nose, behind each
-        spare = np.zeros(len(wanted))
+        spare = np.full(len(wanted), math.inf)  # behind the last one
         spare[:-1] = wanted[:-1] - shape.length - lane.fronts[1:] - config.change_gap - headway * lane.speeds[1:]
         has_room = spare >= 0.0
         shifts = wanted - shape.front - 0.5 * np.minimum(spare, config.change_gap)
