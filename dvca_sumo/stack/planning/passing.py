@@ -67,10 +67,10 @@ class Passing:
             return None
         occupied = self._gaps.occupied(way, window.station, objects)
         stop = None if leads_on else last_stop(way, window, 1, speed, shape, config)
-        is_late = not leads_on and way.latest_station - nose < config.return_room * speed
         beside = self._pace_on(occupied[_BESIDE], wanted, _LONGER * config.passing_outlook, is_own=False)
         own = self._pace_on(occupied[_OWN], wanted, config.passing_outlook, is_own=True)
         is_queue = own < config.passing_slowest
+        is_late = not leads_on and (is_queue or way.latest_station - nose < config.return_room * speed)
         wish = target = self._wish(beside, own, is_late=is_late, is_queue=is_queue)
         if target != self._lane:
             is_under_way = self._lane != self._target

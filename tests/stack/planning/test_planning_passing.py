@@ -66,6 +66,16 @@ def test_a_queue_that_may_be_for_where_the_ego_goes_is_joined() -> None:
     assert lanes(drive(beside(leads_on=False), 60.0, speed=13.0, actors=queue(1.0))) == [0]
 
 
+def test_behind_a_queue_that_may_be_for_where_the_ego_goes_it_comes_back() -> None:
+    """Those whom it is about to pass come up to the end of one."""
+    slow = [car(7 + row, 80.0 + 50.0 * row, speed=8.5, stays_from=(318.0 - 42.0 * row) / 8.5) for row in range(1, 4)]
+    standing = [car(30 + row, 430.0 + 8.0 * row, speed=0.8) for row in range(40)]
+    driven = drive(beside(leads_on=False), 40.0, speed=13.0, actors=[*slow, *standing])
+    assert lanes(driven) == [0, 1, 0]
+    assert driven.fronts[-1] < 430.0
+    assert driven.clearances.min() > 1.0
+
+
 def test_what_only_stands_about_is_passed_within_the_lane_or_next_to_it() -> None:
     across = car(7, 150.0, -2.4, heading=np.pi / 2.0, size=(4.0, 1.8))
     driven = drive(beside(), 40.0, speed=13.0, actors=[across, cone(8, 300.0, -1.0)])
