@@ -44,7 +44,6 @@ class _Part(msgspec.Struct, frozen=True, eq=False):
     own: Lane
     lane: Lane
     before: Sequence[Movement]  # from the part before
-    is_plain: bool  # they lead straight on, and nobody has to give way there
     rows: slice  # of the line that follow `own`
 
 
@@ -96,13 +95,10 @@ def _part(
     for movement in ways:
         onward = None if came_by is None else alongside(net, movement, came_by, _BEND)
         if onward is None:
-            return _Part(own, lane, (), False, rows)
+            return _Part(own, lane, (), rows)
         before.append(onward)
         came_by = net.lanes[onward.to_lane]
-    is_plain = all(
-        one.state == _FIRST and one.signal_id is None and one.direction == _STRAIGHT for one in (*ways, *before)
-    )
-    return _Part(own, lane, before if came_by is lane else (), is_plain, rows)
+    return _Part(own, lane, before if came_by is lane else (), rows)
 
 
 def _drawn(net: NetContents, parts: Sequence[_Part], way: Way) -> Iterator[PassingLane]:
@@ -133,8 +129,13 @@ def _drawn(net: NetContents, parts: Sequence[_Part], way: Way) -> Iterator[Passi
 def _junctions(parts: Sequence[_Part], line: Polyline) -> Iterator[Span]:
     """Where junctions are on which somebody may have to wait."""
     for before, part in itertools.pairwise(parts):
-        if not part.is_plain:
+        if not all(_is_plain(movement) for movement in part.before):
             yield float(line.stations[before.rows.stop - 1]), float(line.stations[part.rows.start])
+
+
+def _is_plain(movement: Movement) -> bool:
+    """Whether it leads straight on, and nobody has to give way there."""
+    return movement.state == _FIRST and movement.signal_id is None and movement.direction == _STRAIGHT
 
 
 def _lanes(net: NetContents, parts: Sequence[_Part]) -> Iterator[Lane]:

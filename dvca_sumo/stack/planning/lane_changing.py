@@ -130,7 +130,7 @@ def last_stop(
 def is_at_junction(
     change: LaneChange, window: Window, speed: float, shape: VehicleShape, config: PlanningConfig
 ) -> bool:
-    """Whether a change begun now would be made on a junction."""
+    """Whether a change begun now would be made on one of the junctions on its way."""
     way = blend_length(max(change.widths), max(speed, LAST_SPEED), config)
     low, high = window.station - shape.rear_overhang, window.station + shape.front + way
     return any(begin < high and end > low for begin, end in change.junctions)
