@@ -32,6 +32,15 @@ def flow(lane: int, period: float) -> str:
     )
 
 
+def parked(edges: str, lane: str, front: int, spacing: int, count: int) -> str:
+    """Cars that stand on a lane for the whole run, the first with its front at `front` [m]."""
+    return "".join(
+        f'<vehicle id="q{row}" depart="0" departLane="{lane[-1]}" departPos="{place}"><route edges="{edges}"/>'
+        f'<stop lane="{lane}" startPos="{place - 7}" endPos="{place}" duration="500"/></vehicle>'
+        for row, place in enumerate(range(front, front - spacing * count, -spacing))
+    )
+
+
 @pytest.mark.parametrize("period", [3.0, 5.0])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_ego_gets_over_two_lanes_to_its_turn_without_troubling_anybody(
@@ -46,12 +55,8 @@ def test_ego_gets_over_two_lanes_to_its_turn_without_troubling_anybody(
 
 
 def test_ego_waits_in_its_lane_when_nobody_leaves_a_gap(tmp_path: Path, plain_file: Callable[..., Path]) -> None:
-    parked = "".join(
-        f'<vehicle id="q{row}" depart="0" departLane="2" departPos="{495 - 7 * row}"><route edges="ab bd"/>'
-        f'<stop lane="ab_2" startPos="{488 - 7 * row}" endPos="{495 - 7 * row}" duration="500"/></vehicle>'
-        for row in range(60)
-    )
-    config = scenario_file(tmp_path, plain_file(NODES, EDGES, CONNECTIONS), parked + EGO, end="110")
+    standing = parked("ab bd", "ab_2", 495, 7, 60)
+    config = scenario_file(tmp_path, plain_file(NODES, EDGES, CONNECTIONS), standing + EGO, end="110")
     record = driven(config)
     assert record.path[-1].speed == 0.0
     assert not any(one.kind == "collision" for one in record.violations)
@@ -65,13 +70,9 @@ def test_ego_that_finds_no_gap_before_a_junction_changes_lanes_behind_it(
     before = '<edge id="ae" from="a" to="e" numLanes="3" speed="13.9"/>'
     connections = CONNECTIONS.replace('from="ab"', 'from="eb"')
     net = plain_file(NODES + '<node id="e" x="200" y="0"/>', edges + before, connections)
-    parked = "".join(
-        f'<vehicle id="q{row}" depart="0" departLane="2" departPos="{195 - 8 * row}"><route edges="ae eb bd"/>'
-        f'<stop lane="ae_2" startPos="{188 - 8 * row}" endPos="{195 - 8 * row}" duration="500"/></vehicle>'
-        for row in range(24)
-    )
+    standing = parked("ae eb bd", "ae_2", 195, 8, 24)
     ego = '<vehicle id="ego" depart="20" departLane="1" departSpeed="max"><route edges="ae eb bd"/></vehicle>'
-    record = driven(scenario_file(tmp_path, net, parked + ego))
+    record = driven(scenario_file(tmp_path, net, standing + ego))
     assert record.violations == []
     assert record.ending is Ending.ARRIVED
 
@@ -96,12 +97,8 @@ def test_ego_passes_a_queue_that_turns_off_and_goes_on_past_the_signals(
         f'<connection from="{one}" to="{to}" fromLane="{lane}" toLane="{onto}"/>'
         for one, to, lane, onto in (("ab", "bd", 0, 0), ("ab", "bc", 0, 0), ("ab", "bc", 1, 1), ("db", "bc", 0, 0))
     )
-    parked = "".join(
-        f'<vehicle id="q{row}" depart="0" departLane="0" departPos="{588 - 8 * row}"><route edges="ab bd"/>'
-        f'<stop lane="ab_0" startPos="{581 - 8 * row}" endPos="{588 - 8 * row}" duration="500"/></vehicle>'
-        for row in range(40)
-    )
+    standing = parked("ab bd", "ab_0", 588, 8, 40)
     ego = '<vehicle id="ego" depart="20" departLane="0" departSpeed="max"><route edges="ab bc"/></vehicle>'
-    record = driven(scenario_file(tmp_path, plain_file(nodes, edges, connections), parked + ego))
+    record = driven(scenario_file(tmp_path, plain_file(nodes, edges, connections), standing + ego))
     assert record.violations == []
     assert record.ending is Ending.ARRIVED
