@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import msgspec
 
+from dvca_sumo.roadmap.beside import TURN, alongside, faster
 from dvca_sumo.roadmap.lanes import Lane, Movement
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.route import RouteError
@@ -14,6 +15,7 @@ _SHORTEST_CHANGE = 30.0  # [m] it takes at low speed
 _LEAST_ROOM = 5.0  # [m] below this a change is no longer driving
 _CRAMPED = 5.0  # lane changes that one without any room is worth
 _LATER = 1e-4  # lane changes that waiting one edge is worth: of equal ways, change early
+_ALONE = 1e-6  # lane changes that a junction without a faster lane beside is worth: of equal ways, leave it free
 
 
 class Leg(msgspec.Struct, frozen=True, eq=False):
@@ -47,7 +49,8 @@ def lane_sequence(
     """The cheapest legs from `start` to `arrival`, each a lane (any, where None) and a position on it [m].
 
     Exact (dynamic programming over the lanes of each edge); of equal ways the one that changes lanes
-    earliest. Raises RouteError where there is no way.
+    earliest, then the one that over most junctions has the next lane of faster ones beside it. Raises RouteError
+    where there is no way.
     """
     ways = {start[0]: _Way(0.0, net.lanes[start[0]])}
     for order, edge in enumerate(edges):
@@ -68,11 +71,20 @@ def _entered(net: NetContents, ways: dict[str, _Way], before: str, edge: str) ->
     for way in ways.values():
         for movement in net.movements.get(way.lane.id, ()):
             lane = net.lanes[movement.to_lane]
-            if lane.edge == edge and movement.is_drivable and way.cost < _cost(found, lane):
-                found[lane.id] = _Way(way.cost, lane, way, movement)
+            if lane.edge != edge or not movement.is_drivable:
+                continue
+            cost = way.cost + (0.0 if _is_beside(net, movement) else _ALONE)
+            if cost < _cost(found, lane):
+                found[lane.id] = _Way(cost, lane, way, movement)
     if not found:
         raise RouteError(_gap(net, before, edge))
     return found
+
+
+def _is_beside(net: NetContents, movement: Movement) -> bool:
+    """Whether the next lane of faster ones leads on beside it."""
+    beside = faster(net, net.lanes[movement.from_lane])
+    return beside is not None and alongside(net, movement, beside, TURN) is not None
 
 
 def _gap(net: NetContents, before: str, edge: str) -> str:

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 import msgspec
 
 from dvca_sumo.geometry.polyline import Polyline
+from dvca_sumo.roadmap.beside import alongside, faster
 from dvca_sumo.roadmap.bounds import evened, way_beside
-from dvca_sumo.roadmap.extending import alongside
 from dvca_sumo.roadmap.lanes import Lane, Movement
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.route import PassingLane
@@ -61,7 +61,7 @@ def _chains(net: NetContents, way: Way) -> Iterator[list[_Part]]:
             continue
         ways = _until(net, own.edge, way.movements[taken:])
         taken += len(ways)
-        lane = _faster(net, own)
+        lane = faster(net, own)
         part = None if lane is None else _part(net, parts, own, lane, ways, rows)
         if parts and (part is None or not part.before):
             yield parts
@@ -75,15 +75,6 @@ def _chains(net: NetContents, way: Way) -> Iterator[list[_Part]]:
 def _until(net: NetContents, edge: str, movements: Sequence[Movement]) -> list[Movement]:
     """The first ones, up to that from `edge`."""
     return list(itertools.takewhile(lambda one: net.lanes[one.from_lane].edge != edge, movements))
-
-
-def _faster(net: NetContents, lane: Lane) -> Lane | None:
-    """The next lane that faster ones take: SUMO numbers lanes from the slow side."""
-    for side in (lane.left, lane.right):
-        if side is not None and net.lanes[side].index > lane.index:
-            found = net.lanes[side]
-            return found if found.speed_limit >= lane.speed_limit else None
-    return None
 
 
 def _part(

@@ -43,6 +43,30 @@ def test_arrival_lane_is_reached(plain: NetBuilder) -> None:
     assert lanes_of(roadmap, ["ab", "bc"], "ab_0", "bc_1") == ["ab_0", "ab_1", "bc_1"]
 
 
+WIDENING = """
+<edge id="ab" from="a" to="b" numLanes="2"/><edge id="bc" from="b" to="c" numLanes="3"/>"""
+WIDENING_CONNECTIONS = """
+<connection from="ab" to="bc" fromLane="0" toLane="0"/><connection from="ab" to="bc" fromLane="0" toLane="1"/>
+<connection from="ab" to="bc" fromLane="1" toLane="{beside}"/>"""
+
+
+@pytest.mark.parametrize(("beside", "taken"), [(2, "bc_1"), (1, "bc_0")])
+def test_where_its_lane_forks_the_half_is_taken_beside_which_the_faster_lane_runs_on(
+    plain: NetBuilder, beside: int, taken: str
+) -> None:
+    roadmap = plain(NODES, WIDENING, WIDENING_CONNECTIONS.format(beside=beside))
+    assert lanes_of(roadmap, ["ab", "bc"], "ab_0") == ["ab_0", taken]
+
+
+def test_where_the_fastest_lane_forks_the_slower_half_is_taken(plain: NetBuilder) -> None:
+    roadmap = plain(
+        NODES,
+        WIDENING.replace('numLanes="2"', 'numLanes="1"').replace('numLanes="3"', 'numLanes="2"'),
+        WIDENING_CONNECTIONS.split("\n")[1],
+    )
+    assert lanes_of(roadmap, ["ab", "bc"], "ab_0") == ["ab_0", "bc_0"]
+
+
 def test_bus_lane_is_not_taken_by_a_car(plain: NetBuilder) -> None:
     edges = FORK.replace(
         '<edge id="bc" from="b" to="c" numLanes="2"/>',
