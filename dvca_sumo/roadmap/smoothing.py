@@ -10,10 +10,11 @@ from dvca_sumo.roadmap.easing import eased
 
 _FINE = 0.25  # [m] between points while smoothing
 _KERNELS = (0.5, 1.0, 2.0, 4.0, 8.0)  # [m] standard deviations; the first always applies
-_DEVIATION = 0.25  # [m] from the rough line that wider kernels may cause
-_TIGHT = 0.15  # [1/m] curvature from which on a vehicle needs a wider turn
+_DEVIATION = 0.25  # [m] from the rough line that wider kernels and easing may cause
+_BENT = 0.01  # [1/m] curvature from which on a vehicle has to slow down
+_TIGHT = 0.15  # [1/m] curvature from which on it needs a wider turn
 _TIGHT_DEVIATION = 0.6  # [m] allowed there: a car still stays in a lane of 3.2 m
-_TIGHT_REACH = 3.0  # [m] around a tight turn
+_TIGHT_REACH = 3.0  # [m] around a turn too tight for a vehicle to follow
 _REVERSAL = -0.34  # cosine of the turn (110 degrees) that begins a step back
 _BACKTRACK = 15.0  # [m] at most, back and forth again
 _SIDESTEP = 4.0  # [m] sideways at most where the line goes on
@@ -28,15 +29,16 @@ def smoothed(rough: Polyline) -> tuple[Floats, Floats]:
     Both ends stay. Wider and wider Gaussian kernels are applied wherever the line stays within 0.25 m
     of the rough one (0.6 m around tight turns); a kernel of standard deviation s turns a kink of angle
     a into a bend of curvature 0.4 a / s and cuts its corner by 0.4 a s. A kink so sharp that no kernel
-    would do is rounded by the narrowest all the same (0.3 m at a right angle). Where the net draws
-    consecutive lanes overlapping, so that the line would step back, the step is left out.
+    would do is rounded by the narrowest all the same (0.3 m at a right angle). Bends that remain are
+    eased: within the same distances, the line of least curvature. Where the net draws consecutive lanes
+    overlapping, so that the line would step back, the step is left out.
     """
     original, along = _resampled(rough.points, rough.stations)
     kept = _advancing(original)
     if not kept.all():
         original, along = _resampled(original[kept], along[kept])
     points = _convolved(original, _KERNELS[0])
-    tight = _tight(original)
+    tight = _widened(_bent(_convolved(original, 1.0), _TIGHT), _TIGHT_REACH)
     limits = np.where(tight, _TIGHT_DEVIATION, _DEVIATION)
     for width in _KERNELS[1:]:
         wider = _convolved(original, width)
@@ -44,7 +46,7 @@ def smoothed(rough: Polyline) -> tuple[Floats, Floats]:
         strays = _widened(np.hypot(gaps[:, 0], gaps[:, 1]) > limits, 3.0 * width)
         share = _convolved(1.0 - strays[:, None].astype(float), 0.5 * width)
         points = points + share * (wider - points)
-    return _convolved(eased(points, original, tight, _TIGHT_DEVIATION, _FINE), _KERNELS[0]), along
+    return _convolved(eased(points, original, tight | _bent(points, _BENT), limits, _FINE), _KERNELS[0]), along
 
 
 def _resampled(points: Floats, along: Floats) -> tuple[Floats, Floats]:
@@ -86,11 +88,11 @@ def _frame(step: Floats) -> Floats:
     return np.array([[x, -y], [y, x]])
 
 
-def _tight(points: Floats) -> npt.NDArray[np.bool_]:
-    """Points on or near turns too tight for a vehicle to follow."""
-    steps = np.diff(_convolved(points, 1.0), axis=0)
+def _bent(points: Floats, curvature: float) -> npt.NDArray[np.bool_]:
+    """Points where the line is bent more than that [1/m]."""
+    steps = np.diff(points, axis=0)
     turns = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
-    return _widened(np.concatenate(([False], turns > _TIGHT * _FINE, [False])), _TIGHT_REACH)
+    return np.concatenate(([False], turns > curvature * _FINE, [False]))
 
 
 def _widened(marked: npt.NDArray[np.bool_], reach: float) -> npt.NDArray[np.bool_]:

@@ -61,6 +61,18 @@ def test_bend_is_rounded_close_to_the_lane(plain: NetBuilder) -> None:
     assert route.line.headings[-1] == pytest.approx(np.arctan2(60.0, 100.0), abs=0.01)
 
 
+def test_bend_drawn_with_kinks_is_driven_steadily_within_the_lane(plain: NetBuilder) -> None:
+    radius, angles = 50.0, np.arange(0.0, 1.5 * np.pi, 0.3)  # a ramp, with a kink every 15 m
+    ramp = [(radius * np.sin(angle), radius * (1.0 - np.cos(angle))) for angle in angles]
+    shape = " ".join(f"{x:.2f},{y:.2f}" for x, y in [(-100.0, 0.0), *ramp])
+    nodes = f'<node id="a" x="-100" y="0"/><node id="b" x="{ramp[-1][0]:.2f}" y="{ramp[-1][1]:.2f}"/>'
+    roadmap = plain(nodes, f'<edge id="e" from="a" to="b" shape="{shape}"/>')
+    route = roadmap.route(["e"], "e_0", 10.0, None, 300.0)
+    check_sound(route)
+    assert np.abs(route.curvatures).max() < 1.5 / radius
+    assert np.abs(roadmap.lanes["e_0"].line.project(route.line.points[:-5])[1]).max() < 0.3
+
+
 def test_turn_at_a_junction_can_be_driven(grid: NetBuilder) -> None:
     route = grid().route(["A0B0", "B0B1"], "A0B0_0", 5.0, None, 100.0)
     check_sound(route)
@@ -165,7 +177,7 @@ def test_on_a_junction_the_road_is_as_wide_as_its_area_allows(grid: NetBuilder) 
     route = roadmap.route(["A0B0", "B0B1"], "A0B0_1", 5.0, None, 100.0)
     line = route.stop_lines[0]
     middle = int(0.5 * (line.station + line.exit_station))
-    before = int(line.station) - 5
+    before = int(line.station) - 20
     assert (route.road_left[before], route.road_right[before]) == pytest.approx((1.6, -4.8), abs=0.01)
     assert route.road_left[middle] > route.lane_left[middle] + 1.0  # the middle of the junction
     assert route.road_right[middle] < route.lane_right[middle] - 1.0

@@ -120,7 +120,7 @@ def beyond(line: Polyline, drawn: Polyline, half: float) -> float:
     return float(np.abs(found[inner, 1]).max()) - half
 
 
-@pytest.mark.parametrize("angle", [0.35 * np.pi, 0.5 * np.pi, 0.7 * np.pi])
+@pytest.mark.parametrize("angle", [0.45 * np.pi, 0.5 * np.pi, 0.7 * np.pi])
 @pytest.mark.parametrize("radius", [7.0, 7.5])
 def test_a_turn_that_can_be_steered_is_drawn_so_that_the_body_stays_in_its_lane(radius: float, angle: float) -> None:
     line, half = Polyline(smoothed(corner(radius, angle))[0]), 1.6
@@ -148,4 +148,4 @@ def test_where_the_line_cuts_a_sharp_tip_it_is_on_the_next_lane_at_once(plain: N
     for row in driven.nonzero()[0].tolist():
         lane, point = net.lanes[route.lane_ids[row]].line, route.line.points[row]
         station, _ = lane.project([point])
-        assert np.hypot(*(lane.poses(station)[0, :2] - point)) < 5.5
+        assert np.hypot(*(lane.poses(station)[0, :2] - point)) < 6.0
