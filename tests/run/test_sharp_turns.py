@@ -22,3 +22,17 @@ def test_ego_keeps_to_the_road(
     record = driven(scenario_file(tmp_path, grid_file(*options), ego))
     assert record.ending is Ending.ARRIVED
     assert record.violations == []
+
+
+@pytest.mark.parametrize("depart", [20.0, 21.0, 22.0, 23.0])
+def test_ego_that_swings_out_to_turn_back_lets_others_pass_on_the_next_lane(
+    tmp_path: Path, grid_file: Callable[..., Path], depart: float
+) -> None:
+    net = grid_file("--default.lanenumber=2")
+    others = (
+        '<flow id="on" begin="0" end="60" period="4" departLane="0" departSpeed="max"><route edges="A1B1 B1C1"/></flow>'
+    )
+    ego = f'<vehicle id="ego" depart="{depart}" departLane="1" departSpeed="max"><route edges="A1B1 B1A1"/></vehicle>'
+    record = driven(scenario_file(tmp_path, net, others + ego))
+    assert record.ending is Ending.ARRIVED
+    assert record.violations == []

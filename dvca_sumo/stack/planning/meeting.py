@@ -130,11 +130,13 @@ class Meetings:
             return told is not False or len(scene.lanes[row]) < _STILL_TO_CROSS
         if told is not None:
             return told
-        return True if self._is_off_lane(graph) or not self._cuts_in(row, graph) else None
+        return True if self._is_off_lane(row, graph) or not self._cuts_in(row, graph) else None
 
-    def _is_off_lane(self, graph: Graph) -> bool:
-        window = graph.window
-        room = min(float(window.lane_left[BEHIND]), -float(window.lane_right[BEHIND]))
+    def _is_off_lane(self, row: int, graph: Graph) -> bool:
+        """Whether the line is off its lane here, or where the two ways meet."""
+        window, met = graph.window, graph.scene.futures.rows(graph.window)[:, row, graph.first[row]]
+        rows = [BEHIND, *met.tolist()]
+        room = min(float(window.lane_left[rows].min()), -float(window.lane_right[rows].max()))
         return 0.5 * self._shape.width - room > _OFF_LANE
 
     def _cuts_in(self, row: int, graph: Graph) -> bool:
