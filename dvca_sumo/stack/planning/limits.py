@@ -26,6 +26,8 @@ _BESIDE = 3.0  # [m] sideways
 _AT_LINE = 4.0  # [m] before or past it
 _SLOWED = 4.0  # [m/s]
 _SLOW_MOVER = 3.0  # [m/s] faster ones are not passed slowly
+_BEFORE_WAITING = 3.0  # [m/s] in front of who has priority and stands ...
+_NOSE = 6.0  # ... so near to the ego's way [m]
 _OCCUPIED = "stop exit occupied"
 _HERE = 0.1  # [m] is as near to a place as being at it
 _GIVE_AT_DESTINATION = 1.0  # [m]
@@ -47,7 +49,8 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
     turning = config.steering_rate * _STEERED / (shape.wheelbase * np.maximum(changes, 1e-4))
     middle = slice(_STEERED // 2, _STEERED // 2 + len(turning))
     caps[middle] = np.minimum(caps[middle], turning)
-    for row, cap in _passing_speeds(graph, config):
+    passed = [*_passing_speeds(graph, config), *((row, _BEFORE_WAITING) for row in _waiting(graph, views))]
+    for row, cap in passed:
         low, high = graph.low[row, 0] - shape.front, graph.high[row, 0] + shape.rear_overhang
         if high > 0.0:
             part = slice(max(int(low), 0), int(high) + 1)
@@ -65,6 +68,25 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
             caps[part] = np.minimum(caps[part], config.peering_speed)
     slowed: list[float] = slowed_before(caps, path.arcs, config.slowing).tolist()
     return slowed
+
+
+def _waiting(graph: Graph, views: list[LineView]) -> list[int]:
+    """Vehicles that stand before the ego's way, pointing at it, and have priority: they may set off at any time.
+
+    As rows of the graph. At signals they are those who have to wait.
+    """
+    scene = graph.scene
+    prior = frozenset().union(*(view.goes_first for view in views if view.line.control is not Control.SIGNAL))
+    rows = [row for row in range(scene.moving, len(scene.lanes)) if not prior.isdisjoint(scene.lanes[row])]
+    if not rows:
+        return []
+    boxes, gaps = scene.boxes[scene.owners[rows]], graph.gaps[rows, 0]
+    ahead = 0.5 * boxes[:, 3:4] * np.column_stack((np.cos(boxes[:, 2]), np.sin(boxes[:, 2])))
+    _, noses, _ = graph.window.project(boxes[:, :2] + ahead)
+    _, tails, _ = graph.window.project(boxes[:, :2] - ahead)
+    waits = (gaps > 0.0) & (gaps < _NOSE) & (np.abs(noses) < np.abs(tails))
+    waits &= np.abs(scene.futures.directions[rows, 0]) < ALONG
+    return [row for row, is_one in zip(rows, waits.tolist(), strict=True) if is_one]
 
 
 def _hiding(graph: Graph, line: float) -> float:

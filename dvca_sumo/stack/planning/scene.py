@@ -89,6 +89,7 @@ def scene_in(
         around = _is_around(window, poses)
         rows, poses = rows[around], poses[around]
     owners = predicted.owners[rows]
+    on = dict(zip(predicted.owners.tolist(), predicted.lanes, strict=True))
     now, futures = _extents(window, objects.boxes, poses, owners, still)
     return Scene(
         ids=ids,
@@ -100,7 +101,7 @@ def scene_in(
         times=PREDICTION_TIMES - (time - predicted.time),
         owners=np.concatenate((owners, still)),
         probabilities=np.concatenate((predicted.probabilities[rows], np.ones(len(still)))),
-        lanes=[predicted.lanes[row] for row in rows.tolist()] + [()] * len(still),
+        lanes=[predicted.lanes[row] for row in rows.tolist()] + [on.get(row, ()) for row in still.tolist()],
         futures=futures,
         moving=len(rows),
         poses=poses,

@@ -366,6 +366,28 @@ def test_ego_feels_its_way_until_the_middle_of_its_body_is_abreast_of_who_hides_
     assert driven.speeds[peers].max() < 2.6
 
 
+@pytest.mark.parametrize(
+    ("lane", "heading", "slowest"),
+    [("major_0", UP, (2.5, 3.5)), ("minor_0", UP, (6.0, 10.0)), ("major_0", DOWN, (6.0, 10.0))],
+    ids=["may set off", "has to wait", "has crossed"],
+)
+def test_before_the_nose_of_who_has_priority_and_stands_the_ego_is_slow(
+    lane: str, heading: float, slowest: tuple[float, float]
+) -> None:
+    waiting = car(3, 106.0, -4.6, heading=heading, lanes=(lane,))
+    driven = drive(road(stop_lines=[stop_line(100.0, Control.YIELD)]), 20.0, speed=13.0, actors=[waiting])
+    beside = (driven.fronts > 104.0) & (driven.fronts < 108.0)
+    assert slowest[0] < driven.speeds[beside].min() < slowest[1]
+    assert driven.fronts[-1] > 150.0
+
+
+@pytest.mark.parametrize("leaves", np.arange(4.0, 8.0, 0.25))
+def test_who_sets_off_right_before_the_ego_is_not_hit(leaves: float) -> None:
+    waiting = car(3, 106.0, -4.6, heading=UP, speed=2.0, leaves=leaves, lanes=("major_0",))
+    driven = drive(road(stop_lines=[stop_line(100.0, Control.YIELD)]), 20.0, speed=13.0, actors=[waiting])
+    assert driven.clearances.min() > 0.2
+
+
 @pytest.mark.parametrize("x", [99.3, 106.0])
 def test_car_that_has_to_wait_is_passed(x: float) -> None:
     """Also where a part of it is on this side of the ego's stop line."""
