@@ -27,7 +27,8 @@ _AT_LINE = 4.0  # [m] before or past it
 _SLOWED = 4.0  # [m/s]
 _SLOW_MOVER = 3.0  # [m/s] faster ones are not passed slowly
 _BEFORE_WAITING = 3.0  # [m/s] in front of who has priority and stands ...
-_NOSE = 6.0  # ... so near to the ego's way [m]
+_NOSE = 6.0  # ... so near to the ego's way [m] ...
+_ROOM_TO_STOP = 3.0  # ... and as far before it, should it set off [m]
 _OCCUPIED = "stop exit occupied"
 _HERE = 0.1  # [m] is as near to a place as being at it
 _GIVE_AT_DESTINATION = 1.0  # [m]
@@ -49,9 +50,10 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
     turning = config.steering_rate * _STEERED / (shape.wheelbase * np.maximum(changes, 1e-4))
     middle = slice(_STEERED // 2, _STEERED // 2 + len(turning))
     caps[middle] = np.minimum(caps[middle], turning)
-    passed = [*_passing_speeds(graph, config), *((row, _BEFORE_WAITING) for row in _waiting(graph, views))]
-    for row, cap in passed:
-        low, high = graph.low[row, 0] - shape.front, graph.high[row, 0] + shape.rear_overhang
+    passed = [(row, cap, 0.0) for row, cap in _passing_speeds(graph, config)]
+    passed += [(row, _BEFORE_WAITING, _ROOM_TO_STOP) for row in _waiting(graph, views)]
+    for row, cap, room in passed:
+        low, high = graph.low[row, 0] - shape.front - room, graph.high[row, 0] + shape.rear_overhang
         if high > 0.0:
             part = slice(max(int(low), 0), int(high) + 1)
             caps[part] = np.minimum(caps[part], cap)
