@@ -28,6 +28,7 @@ _STRAIGHT = 0.35  # [rad] less turning than this goes straight on
 _STRAIGHT_WEIGHT = 3.0  # going straight against turning
 _TURNAROUND = 2.6  # [rad]
 _TURNAROUND_WEIGHT = 0.1
+_LEAST = 0.05  # probability of a way at a fork that is looked at in any case
 _BEND = 2  # rows (metres) to either side over which curvature is taken
 _WINDOW = np.arange(-8, 9)  # rows (metres) around a guessed station that a projection searches
 
@@ -57,6 +58,14 @@ class Placements(NamedTuple):
     headings: Floats  # (h,) [rad] of the path there
     half_widths: Floats  # (h,) [m] of the lane there
     beyond: Floats  # (h,) [m] how far outside the searched stretch the point lies, 0 within
+
+
+class _End(NamedTuple):
+    """How far a continuation is known."""
+
+    probability: float
+    lanes: tuple[str, ...]
+    covered: float  # [m]
 
 
 class LanePaths:
@@ -129,20 +138,48 @@ class LanePaths:
         return np.concatenate((0.5 * (fronts + rears), np.arctan2(ways[:, :, _Y], ways[:, :, _X])[:, :, None]), axis=2)
 
     def _continuations(self, lane: str, length: float) -> list[tuple[float, tuple[str, ...]]]:
-        """Best-first search: the first ones to reach `length` are the likeliest."""
-        lanes = self._lanes
+        """The likeliest ones, and of each way at the first fork at least the likeliest: they share its probability."""
+        fork = self._fork(lane, length)
+        likeliest = self._likeliest(fork, length, self._max_branches)
+        if fork.covered >= length:
+            return likeliest
+        found = []
+        for way in self._onward(fork):
+            if way.probability >= _LEAST:
+                taken = [each for each in likeliest if each[1][: len(way.lanes)] == way.lanes]
+                taken = taken or self._likeliest(way, length, 1)
+                total = sum(probability for probability, _ in taken)
+                found += [(way.probability * probability / total, lanes) for probability, lanes in taken]
+        return found or likeliest
+
+    def _fork(self, lane: str, length: float) -> "_End":
+        """As far as there is one way only, up to `length` [m]."""
+        end = _End(1.0, (lane,), self._lanes[lane].line.length)
+        while end.covered < length and len(onward := self._onward(end)) == 1:
+            end = onward[0]
+        return end
+
+    def _likeliest(self, begin: "_End", length: float, count: int) -> list[tuple[float, tuple[str, ...]]]:
+        """Best-first search: the first ones to reach `length` [m] are the likeliest."""
         likely: list[tuple[float, tuple[str, ...]]] = []
-        open_ends: list[tuple[float, tuple[str, ...], float]] = [(-1.0, (lane,), lanes[lane].line.length)]
-        while open_ends and len(likely) < self._max_branches:
-            probability, followed, covered = heapq.heappop(open_ends)
-            weights = self._weights(followed[-1]) if covered < length else {}
-            if not weights:
-                likely.append((-probability, followed))
-            total = sum(weights.values())
-            for successor, weight in weights.items():
-                further = covered + lanes[successor].line.length
-                heapq.heappush(open_ends, (probability * weight / total, (*followed, successor), further))
+        open_ends = [(-begin.probability, begin)]
+        while open_ends and len(likely) < count:
+            _, end = heapq.heappop(open_ends)
+            onward = self._onward(end) if end.covered < length else []
+            if not onward:
+                likely.append((end.probability, end.lanes))
+            for further in onward:
+                heapq.heappush(open_ends, (-further.probability, further))
         return likely
+
+    def _onward(self, end: "_End") -> list["_End"]:
+        """One lane further."""
+        weights = self._weights(end.lanes[-1])
+        total = sum(weights.values())
+        return [
+            _End(end.probability * weight / total, (*end.lanes, lane), end.covered + self._lanes[lane].line.length)
+            for lane, weight in weights.items()
+        ]
 
     def _weights(self, lane: str) -> dict[str, float]:
         """How likely each successor is, against the others. Off the ego's kind of lane, all ways are open."""

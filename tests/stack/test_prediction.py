@@ -2,7 +2,7 @@
 
 import math
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -141,6 +141,34 @@ def test_at_a_fork_every_way_is_a_hypothesis_and_straight_on_the_likeliest(roadm
     assert result.poses[right, -1, 1] < -10.0
     assert result.lanes[right][0] == "in_0"
     assert roadmap.lanes[result.lanes[right][1]].is_internal
+
+
+@pytest.mark.parametrize("arms", [4, 6])
+def test_every_way_at_the_first_fork_is_a_hypothesis_however_many_there_are_and_wherever_they_lead(
+    plain: Callable[..., RoadMap], arms: int
+) -> None:
+    """Straight on, each way forks again so soon that whole continuations straight on are likelier than a turn."""
+    nodes = '<node id="from" x="-200" y="0"/><node id="o" x="0" y="0"/>'
+    edges = '<edge id="in" from="from" to="o"/>'
+    for arm in range(1, arms):
+        angle = math.pi + 2.0 * math.pi * arm / arms
+        nodes += f'<node id="m{arm}" x="{60 * math.cos(angle):.1f}" y="{60 * math.sin(angle):.1f}"/>'
+        edges += f'<edge id="way{arm}" from="o" to="m{arm}"/>'
+        for fork, turn in enumerate((-0.2, 0.0, 0.2)):
+            x, y = (
+                60 * math.cos(angle) + 90 * math.cos(angle + turn),
+                60 * math.sin(angle) + 90 * math.sin(angle + turn),
+            )
+            nodes += f'<node id="n{arm}{fork}" x="{x:.1f}" y="{y:.1f}"/>'
+            edges += f'<edge id="on{arm}{fork}" from="m{arm}" to="n{arm}{fork}"/>'
+    town = plain(nodes, edges)
+    x, y, heading = lane_point(town, "in_0", town.lanes["in_0"].line.length - 10.0)
+    result = predicted(town, Seen(x, y, heading, 13.0))
+    shares = dict.fromkeys((f"way{arm}_0" for arm in range(1, arms)), 0.0)
+    for lanes, probability in zip(result.lanes, result.probabilities.tolist(), strict=True):
+        shares[next(lane for lane in lanes if lane.startswith("way"))] += probability
+    assert min(shares.values()) > 0.1
+    assert sum(shares.values()) == pytest.approx(1.0)
 
 
 def test_ways_that_part_beyond_the_horizon_are_one_hypothesis(roadmap: RoadMap) -> None:

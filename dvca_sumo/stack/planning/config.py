@@ -82,7 +82,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     return_room: float = 10.0  # [s] of room left, from where on the ego comes back
 
     # Whose turn it is.
-    likely: float = 0.2  # probability from which a hypothesis counts
+    likely: float = 0.15  # probability from which a hypothesis counts: that of a turn at most junctions
     possible: float = 0.05  # probability from which it counts when it happens within `soon`
     soon: float = 1.5  # [s]
     pass_margin: float = 1.5  # [s] ahead of someone with priority
