@@ -75,7 +75,7 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
 def _waiting(graph: Graph, views: list[LineView]) -> list[int]:
     """Vehicles that stand before the ego's way, pointing at it, and have priority: they may set off at any time.
 
-    As rows of the graph. At signals they are those who have to wait.
+    As rows of the graph. Not at signals: who stands there has red.
     """
     scene = graph.scene
     prior = frozenset().union(*(view.goes_first for view in views if view.line.control is not Control.SIGNAL))

@@ -58,7 +58,7 @@ class Scene(msgspec.Struct, frozen=True, eq=False):
     times: Floats  # (t,) [s] from the present
     owners: Integers  # (h,) row of the object
     probabilities: Floats  # (h,)
-    lanes: list[tuple[str, ...]]  # (h,)
+    lanes: list[tuple[str, ...]]  # (h,) followed; the one it is on of who stays
     futures: Extents  # (h, t)
     moving: int  # the first `moving` futures move, the others stay where they are
     poses: Floats  # (moving, t, 3) [m], [m], [rad] of the box centres
