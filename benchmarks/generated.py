@@ -1,0 +1,75 @@
+"""How the reference ADS drives networks that nobody drew: those of netgenerate, with random trips.
+
+    python benchmarks/generated.py FOLDER [--nets all_way_stop,left_hand] [--egos 60] [--seed 1] [--jobs 1]
+
+Each net is built in FOLDER/NAME with its traffic (`randomTrips.py` of SUMO, turns back at dead ends included), and
+screened as `dvca-sumo screen` does it, between 100 s and 1100 s. Prints a line for each; which violations there were
+and how to see them stands in FOLDER/NAME/out/screening.txt.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import sumo
+import sumolib
+
+TYPE, LANES = "--default.junctions.type", "--default.lanenumber=2"
+SPIDER = ["--spider", "--spider.arm-number=7", "--spider.circle-number=5", "--spider.space-radius=120"]
+NETS = {
+    "all_way_stop": (1.5, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=allway_stop"]),
+    "left_hand": (1.2, ["--grid", "--grid.number=5", "--grid.length=180", "--lefthand", LANES, "--turn-lanes=1"]),
+    "right_before_left": (1.2, [*SPIDER, f"{TYPE}=right_before_left"]),
+    "signals": (0.8, ["--rand", "--rand.iterations=120", LANES, "--default-junction-type=traffic_light"]),
+}
+BEGIN, END = "100", "1100"  # [s]
+SCREEN = "from dvca_sumo.cli import main; main()"
+
+
+def built(folder: Path, period: float, options: list[str]) -> Path:
+    """A configuration of the net and its traffic, a trip every `period` [s]."""
+    folder.mkdir(parents=True, exist_ok=True)
+    generate = [sumolib.checkBinary("netgenerate"), *options, "--seed=5", "-o", "net.net.xml"]
+    trips = [sys.executable, str(Path(sumo.SUMO_HOME, "tools", "randomTrips.py")), "-n", "net.net.xml"]
+    trips += ["-o", "trips.xml", "-r", "routes.rou.xml", "-e", "1200", "-p", str(period), "--seed=7", "--validate"]
+    for command in (generate, [*trips, "--fringe-factor=3", "--min-distance=300"]):
+        subprocess.run(command, cwd=folder, check=True, capture_output=True)  # noqa: S603 - SUMO's own programs
+    config = folder / "run.sumocfg"
+    config.write_text(
+        '<configuration><input><net-file value="net.net.xml"/><route-files value="routes.rou.xml"/></input>'
+        '<time><step-length value="0.1"/></time></configuration>'
+    )
+    return config
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--nets", default=",".join(NETS))
+    parser.add_argument("--egos", default="60")
+    parser.add_argument("--seed", default="1")
+    parser.add_argument("--jobs", default="1")
+    options = parser.parse_args()
+    print("net                completed  collisions  violations  travel time (median)  SUMO's driver: violations")
+    for name in options.nets.split(","):
+        config = built(options.folder / name, *NETS[name])
+        screen = ["screen", str(config), "--egos", options.egos, "--seed", options.seed, "--jobs", options.jobs]
+        screen += ["--begin", BEGIN, "--end", END, "-o", str(config.parent / "out"), "--json"]
+        run = subprocess.run([sys.executable, "-c", SCREEN, *screen], check=False, capture_output=True, text=True)  # noqa: S603
+        if not run.stdout:
+            raise SystemExit(run.stderr)
+        found = json.loads(run.stdout)
+        ads, theirs = found["ads"], found["sumo_driver"]
+        completed = f"{ads['completed']['count']}/{ads['completed']['total']}"
+        print(
+            f"{name:<17}{completed:>11}{ads['at_fault_collisions']:>12}{ads['at_fault_violations']:>12}"
+            f"{ads['travel_time_ratio']['median']:>22.2f}{theirs['at_fault_violations']:>27}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
