@@ -5,7 +5,6 @@ every path: equal spacing makes a station an index, so no path is searched. Path
 asked for and kept, since traffic uses the same ones again and again.
 """
 
-import heapq
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
@@ -14,21 +13,16 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.stack.continuations import Continuations
 
 # Columns of the table.
 _X, _Y, _HEADING, _BEND_SPEED, _LIMIT, _HALF_WIDTH = range(6)
 
 _TAIL = 300  # [m] beyond a dead end or the net's edge, traffic is taken to go straight on
 _LENGTH_STEP = 40.0  # [m] continuations are kept by length in such steps
-_STRAIGHT = 0.35  # [rad] less turning than this goes straight on
-_STRAIGHT_WEIGHT = 3.0  # going straight against turning
-_TURNAROUND = 2.6  # [rad]
-_TURNAROUND_WEIGHT = 0.1
-_LEAST = 0.05  # probability of a way at a fork that is looked at in any case
 _BEND = 2  # rows (metres) to either side over which curvature is taken
 _WINDOW = np.arange(-8, 9)  # rows (metres) around a guessed station that a projection searches
 
@@ -60,21 +54,13 @@ class Placements(NamedTuple):
     beyond: Floats  # (h,) [m] how far outside the searched stretch the point lies, 0 within
 
 
-class _End(NamedTuple):
-    """How far a continuation is known."""
-
-    probability: float
-    lanes: tuple[str, ...]
-    covered: float  # [m]
-
-
 class LanePaths:
     """All lane paths asked for so far; deterministic, whatever the order of asking."""
 
     def __init__(self, roadmap: RoadMap, *, max_branches: int, lateral_acceleration: float, braking: float) -> None:
         """Bends are driven at `lateral_acceleration` and approached braking with `braking` [m/s^2]."""
         self._lanes = roadmap.lanes
-        self._max_branches = max_branches
+        self._continuations = Continuations(roadmap, max_branches)
         self._lateral_acceleration = lateral_acceleration
         self._braking = braking
         self._rows = np.empty((4096, 6))
@@ -87,7 +73,7 @@ class LanePaths:
         key = (lane, math.ceil(length / _LENGTH_STEP))
         found = self._branches.get(key)
         if found is None:
-            likely = self._continuations(lane, key[1] * _LENGTH_STEP)
+            likely = self._continuations.of(lane, key[1] * _LENGTH_STEP)
             total = sum(probability for probability, _ in likely)
             found = tuple((self._path(lanes), probability / total) for probability, lanes in likely)
             self._branches[key] = found
@@ -136,63 +122,6 @@ class LanePaths:
         fronts, rears = (self.poses(paths, stations + end, offsets)[:, :, :_HEADING] for end in (half, -half))
         ways = fronts - rears
         return np.concatenate((0.5 * (fronts + rears), np.arctan2(ways[:, :, _Y], ways[:, :, _X])[:, :, None]), axis=2)
-
-    def _continuations(self, lane: str, length: float) -> list[tuple[float, tuple[str, ...]]]:
-        """The likeliest ones, and of each way at the first fork at least the likeliest: they share its probability."""
-        fork = self._fork(lane, length)
-        likeliest = self._likeliest(fork, length, self._max_branches)
-        if fork.covered >= length:
-            return likeliest
-        found = []
-        for way in self._onward(fork):
-            if way.probability >= _LEAST:
-                taken = [each for each in likeliest if each[1][: len(way.lanes)] == way.lanes]
-                taken = taken or self._likeliest(way, length, 1)
-                total = sum(probability for probability, _ in taken)
-                found += [(way.probability * probability / total, lanes) for probability, lanes in taken]
-        return found or likeliest
-
-    def _fork(self, lane: str, length: float) -> "_End":
-        """As far as there is one way only, up to `length` [m]."""
-        end = _End(1.0, (lane,), self._lanes[lane].line.length)
-        while end.covered < length and len(onward := self._onward(end)) == 1:
-            end = onward[0]
-        return end
-
-    def _likeliest(self, begin: "_End", length: float, count: int) -> list[tuple[float, tuple[str, ...]]]:
-        """Best-first search: the first ones to reach `length` [m] are the likeliest."""
-        likely: list[tuple[float, tuple[str, ...]]] = []
-        open_ends = [(-begin.probability, begin)]
-        while open_ends and len(likely) < count:
-            _, end = heapq.heappop(open_ends)
-            onward = self._onward(end) if end.covered < length else []
-            if not onward:
-                likely.append((end.probability, end.lanes))
-            for further in onward:
-                heapq.heappush(open_ends, (-further.probability, further))
-        return likely
-
-    def _onward(self, end: "_End") -> list["_End"]:
-        """One lane further."""
-        weights = self._weights(end.lanes[-1])
-        total = sum(weights.values())
-        return [
-            _End(end.probability * weight / total, (*end.lanes, lane), end.covered + self._lanes[lane].line.length)
-            for lane, weight in weights.items()
-        ]
-
-    def _weights(self, lane: str) -> dict[str, float]:
-        """How likely each successor is, against the others. Off the ego's kind of lane, all ways are open."""
-        lanes = self._lanes
-        drivable = [name for name in lanes[lane].successors if lanes[name].is_drivable]
-        followed = drivable if drivable and lanes[lane].is_drivable else lanes[lane].successors
-        weights = {}
-        for name in followed:
-            headings = lanes[name].line.headings
-            turn = abs(wrapped(float(headings[-1 if lanes[name].is_internal else 0] - lanes[lane].line.headings[-1])))
-            weight = _STRAIGHT_WEIGHT if turn < _STRAIGHT else 1.0
-            weights[name] = weight if turn < _TURNAROUND else _TURNAROUND_WEIGHT
-        return weights
 
     def _path(self, lanes: tuple[str, ...]) -> LanePath:
         found = self._paths.get(lanes)
