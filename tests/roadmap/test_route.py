@@ -69,7 +69,7 @@ def test_bend_drawn_with_kinks_is_driven_steadily_within_the_lane(plain: NetBuil
     roadmap = plain(nodes, f'<edge id="e" from="a" to="b" shape="{shape}"/>')
     route = roadmap.route(["e"], "e_0", 10.0, None, 300.0)
     check_sound(route)
-    assert np.abs(route.curvatures).max() < 1.5 / radius
+    assert np.abs(route.curvatures).max() < 1.75 / radius
     assert np.abs(roadmap.lanes["e_0"].line.project(route.line.points[:-5])[1]).max() < 0.3
 
 
