@@ -121,8 +121,10 @@ def steered(
     for rows in _stretches(line, sharp, how.run_up):
         window = _Window(Polyline(line.points[rows]), left[rows], right[rows])
         points = _drawn(window, how.step)
-        parts += [line.points[done : rows.start], points]
-        stations += [line.stations[done : rows.start], line.stations[rows.start] + _abreast(window.line, points)]
+        places = line.stations[rows.start] + _abreast(window.line, points)
+        shared = int(rows.start < done)  # the point where stretches touch
+        parts += [line.points[done : rows.start], points[shared:]]
+        stations += [line.stations[done : rows.start], places[shared:]]
         done = rows.stop
     return np.concatenate([*parts, line.points[done:]]), np.concatenate([*stations, line.stations[done:]])
 

@@ -132,6 +132,16 @@ def test_a_turn_that_can_be_steered_is_drawn_so_that_the_body_stays_in_its_lane(
     assert sharpest(drawn) < SHARPEST
 
 
+def test_stretches_that_touch_share_a_point() -> None:
+    line = Polyline([(0.7 * step, np.sin(0.1 * step)) for step in range(120)])
+    sharp = np.zeros(120, dtype=np.bool_)
+    sharp[[40, 75]] = True  # the run-up of one ends between the points where the other's begins
+    points, stations = steered(line, sharp, *room(line, 1.6), PART)
+    assert np.hypot(*np.diff(points, axis=0).T).min() > 0.0
+    assert np.diff(stations).min() >= 0.0
+    assert points[[0, -1]] == pytest.approx(line.points[[0, -1]])
+
+
 def test_a_wide_turn_is_left_as_it_is() -> None:
     line = corner(25.0, 0.5 * np.pi)
     assert not straying(line, *room(line, 1.6)).any()

@@ -38,8 +38,8 @@ _GIVE_AT_OBJECT = 1.0  # [m] of the distance to it is never spent
 def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config: PlanningConfig) -> list[float]:
     """Highest speed by metre of path [m/s]: limit, curves, how fast the wheels turn, passing close by, lines of others.
 
-    Each is braked for in comfort beforehand. Past such a line the ego feels its way until it sees by who waits beside:
-    it looks from the middle of its body.
+    Close by is also the nose of who may set off. Each is braked for in comfort beforehand. Past such a line the ego
+    feels its way until it sees by who waits beside: it looks from the middle of its body.
     """
     path = graph.path
     caps = np.minimum(
