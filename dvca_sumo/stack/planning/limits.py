@@ -75,19 +75,18 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
 def _waiting(graph: Graph, views: list[LineView]) -> list[int]:
     """Vehicles that stand before the ego's way, pointing at it, and have priority: they may set off at any time.
 
-    As rows of the graph. Not at signals: who stands there has red.
+    As rows of the graph. Not at signals: nearly all who stand there have red.
     """
     scene = graph.scene
     prior = frozenset().union(*(view.goes_first for view in views if view.line.control is not Control.SIGNAL))
     rows = [row for row in range(scene.moving, len(scene.lanes)) if not prior.isdisjoint(scene.lanes[row])]
     if not rows:
         return []
-    boxes, gaps = scene.boxes[scene.owners[rows]], graph.gaps[rows, 0]
+    boxes, gaps, futures = scene.boxes[scene.owners[rows]], graph.gaps[rows, 0], scene.futures
     ahead = 0.5 * boxes[:, 3:4] * np.column_stack((np.cos(boxes[:, 2]), np.sin(boxes[:, 2])))
     _, noses, _ = graph.window.project(boxes[:, :2] + ahead)
-    _, tails, _ = graph.window.project(boxes[:, :2] - ahead)
-    waits = (gaps > 0.0) & (gaps < _NOSE) & (np.abs(noses) < np.abs(tails))
-    waits &= np.abs(scene.futures.directions[rows, 0]) < ALONG
+    points_at = np.abs(noses) < np.abs(futures.offsets[rows, 0])
+    waits = (gaps > 0.0) & (gaps < _NOSE) & points_at & (np.abs(futures.directions[rows, 0]) < ALONG)
     return [row for row, is_one in zip(rows, waits.tolist(), strict=True) if is_one]
 
 

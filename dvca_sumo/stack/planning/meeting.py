@@ -134,8 +134,9 @@ class Meetings:
 
     def _is_off_lane(self, row: int, graph: Graph) -> bool:
         """Whether the line is off its lane here, or where the two ways meet."""
-        window, met = graph.window, graph.scene.futures.rows(graph.window)[:, row, graph.first[row]]
-        rows = [BEHIND, *met.tolist()]
+        window, futures, first = graph.window, graph.scene.futures, graph.first[row]
+        middle, half = futures.stations[row, first], futures.half_lengths[row, first]
+        rows = [BEHIND, *window.index(np.array([middle - half, middle, middle + half])).tolist()]
         room = min(float(window.lane_left[rows].min()), -float(window.lane_right[rows].max()))
         return 0.5 * self._shape.width - room > _OFF_LANE
 
