@@ -24,6 +24,7 @@ _SLOWEST = 2.0  # [m/s] beside a gap ...
 _FALLING_BACK = 5.0  # [m/s] ... and for one that is yet to come, which the ego does not wait for before it has to
 _WITHIN = 0.3  # of its way to the next lane, the ego's body stays in its own
 _SEEN = 120.0  # [m] before and behind the ego
+_CROSSING = 2.0  # [s] at least, from the beginning of a change until the ego is on the next lane
 _FOLLOWED = 1.0  # [s] after somebody the next one may come
 _PAST = 3.5  # times the distance to who is behind, the next lane is in view past them: by the width of cars on lanes
 _NEAR = 30.0  # [m] of effort, beyond which another place is looked for
@@ -92,6 +93,8 @@ class Gaps:
     ) -> bool:
         """Whether nobody on the lane has to brake more than a little when the ego is there; hurried, at once.
 
+        Headways need not be there before the change is over: who is faster than who follows gets away until then.
+
         That is where the change can begin, those on the lane keeping their speeds until then; pressed, where
         the body gets over the marking. Thus it takes up what those who stop for it offer. But who passes before that
         hides others who follow close behind.
@@ -120,7 +123,8 @@ class Gaps:
             pace = lane.speeds[-1]
             gaps = np.append(gaps, tail - rears[-1] + _FOLLOWED * pace)
             followers, closing = np.append(followers, pace), np.append(closing, pace - speed)
-        needed = config.change_gap + headway * followers + _braked(closing, braking)
+        opened = _CROSSING * np.maximum(-closing, 0.0)
+        needed = config.change_gap + np.maximum(headway * followers - opened, 0.0) + _braked(closing, braking)
         return bool((gaps >= needed).all())
 
     def is_in_sight(self, own: Neighbours, lane: Neighbours, wanted: float, speed: float) -> bool:

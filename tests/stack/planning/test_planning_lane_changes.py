@@ -192,3 +192,22 @@ def test_from_standstill_it_does_not_begin_while_somebody_passes_who_hides_those
     lane = Neighbours(places - 4.5, places, np.full(count, 20.0), np.ones(count, dtype=np.bool_), list(range(count)))
     gaps = Gaps(route.line, SHAPE, config)
     assert gaps.is_free(lane, route.lane_changes[0], window, 0.0, is_pressed=True) is is_free
+
+
+@pytest.mark.parametrize(
+    ("pace", "is_free"),
+    [
+        (13.0, False),  # the headway would be missing for good
+        (22.0, True),  # it gets away while the ego changes lanes
+    ],
+)
+def test_close_behind_who_gets_away_it_goes_to_the_next_lane(
+    pace: float,
+    is_free: bool,  # noqa: FBT001
+) -> None:
+    route, config = crossing_over(), PlanningConfig()
+    window = Reference(route, SHAPE, config).window(150.0, 100.0)
+    nose = np.array([SHAPE.front + 3.5])
+    lane = Neighbours(nose, nose + 4.5, np.array([pace]), np.ones(1, dtype=np.bool_), [1])
+    gaps = Gaps(route.line, SHAPE, config)
+    assert gaps.is_free(lane, route.lane_changes[0], window, 13.0, is_pressed=False) is is_free
