@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from dvca_sumo.messages import TrackedObjects, VehicleShape
+from dvca_sumo.messages import PREDICTION_TIMES, PredictedObjects, VehicleShape
 from dvca_sumo.roadmap.route import LaneChange, PassingLane, Route
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.lane_changing import (
@@ -26,6 +26,8 @@ from dvca_sumo.stack.planning.reference import BEHIND, Window
 
 _BESIDE, _OWN = 0, 1  # lanes of the way back
 _LONGER = 2.0  # that the next lane is to be the faster one
+_FIRST, _LAST = np.searchsorted(PREDICTION_TIMES, (2.0, 3.0)).tolist()  # when what is predicted tells how fast one is
+_BETWEEN = float(PREDICTION_TIMES[_LAST] - PREDICTION_TIMES[_FIRST])  # [s]
 
 
 class Passing:
@@ -40,17 +42,17 @@ class Passing:
         self._next = 0  # row of the lane to pass on that the ego is beside, or comes to
         self._lane = self._target = _OWN  # that the ego is on, and is to be on
 
-    def step(self, window: Window, offset: float, speed: float, objects: TrackedObjects) -> LaneChoice | None:
+    def step(self, window: Window, offset: float, speed: float, predicted: PredictedObjects) -> LaneChoice | None:
         """As `LaneChanger.step`; None where the ego is on the route's own lane, and stays there."""
         nose, ways = window.station + self._shape.front, self._ways_back
         while self._next < len(ways) and nose >= ways[self._next].latest_station:
             self._next, self._lane, self._target = self._next + 1, _OWN, _OWN
         if self._next == len(ways) or window.station < ways[self._next].start_station:
             return None
-        return self._choice(ways[self._next], window, offset, speed, objects)
+        return self._choice(ways[self._next], window, offset, speed, predicted)
 
     def _choice(
-        self, way: LaneChange, window: Window, offset: float, speed: float, objects: TrackedObjects
+        self, way: LaneChange, window: Window, offset: float, speed: float, predicted: PredictedObjects
     ) -> LaneChoice | None:
         config, shape = self._config, self._shape
         leads_on = self._lanes[self._next].leads_on
@@ -65,10 +67,10 @@ class Passing:
             self._lane = self._target
         if self._lane == self._target == _OWN and (is_short or aside[_OWN] > ARRIVED):
             return None
-        occupied = self._gaps.occupied(way, window.station, objects)
+        occupied, gains = self._gaps.occupied(way, window.station, predicted.objects), _gains(predicted)
         stop = None if leads_on else last_stop(way, window, 1, speed, shape, config)
-        beside = self._pace_on(occupied[_BESIDE], wanted, _LONGER * config.passing_outlook, is_own=False)
-        own = self._pace_on(occupied[_OWN], wanted, config.passing_outlook, is_own=True)
+        beside = self._pace_on(occupied[_BESIDE], gains, wanted, _LONGER * config.passing_outlook, is_own=False)
+        own = self._pace_on(occupied[_OWN], gains, wanted, config.passing_outlook, is_own=True)
         is_queue = own < config.passing_slowest
         is_late = not leads_on and (is_queue or way.latest_station - nose < config.return_room * speed)
         wish = target = self._wish(beside, own, is_late=is_late, is_queue=is_queue)
@@ -104,16 +106,29 @@ class Passing:
         is_worth_it = beside > own + self._config.passing_gain
         return _BESIDE if is_worth_it and (self._lanes[self._next].leads_on or not is_queue) else _OWN
 
-    def _pace_on(self, lane: Neighbours, wanted: float, outlook: float, *, is_own: bool) -> float:
-        """How fast the slowest is whom the ego, at the speed `wanted`, catches up with within `outlook` [s] [m/s].
+    def _pace_on(
+        self, lane: Neighbours, gains: dict[int, float], wanted: float, outlook: float, *, is_own: bool
+    ) -> float:
+        """How fast the slowest soon is whom the ego, at the speed `wanted`, catches up with within `outlook` [s] [m/s].
 
         What is no traffic slows it down on another lane; on its own it is passed in the lane, or next to it.
         """
+        speeds = lane.speeds + np.array([gains[track] for track in lane.tracks])
         ahead = lane.rears - self._shape.front
-        is_met = (ahead > 0.0) & (ahead < outlook * (wanted - lane.speeds))
+        is_met = (ahead > 0.0) & (ahead < outlook * (wanted - speeds))
         if is_own:
             is_met &= lane.is_traffic
-        return float(lane.speeds[is_met].min(initial=wanted))
+        return float(speeds[is_met].min(initial=wanted))
+
+
+def _gains(predicted: PredictedObjects) -> dict[int, float]:
+    """How much faster each track soon is than now [m/s], as its likeliest hypothesis has it; 0 without any."""
+    objects, owners, order = predicted.objects, predicted.owners, predicted.probabilities.argsort(kind="stable")
+    moved = predicted.poses[order, _LAST, :2] - predicted.poses[order, _FIRST, :2]
+    speeds = np.hypot(objects.velocities[:, 0], objects.velocities[:, 1])
+    soon = speeds.copy()
+    soon[owners[order]] = np.hypot(moved[:, 0], moved[:, 1]) / _BETWEEN
+    return dict(zip(objects.ids.tolist(), (soon - speeds).tolist(), strict=True))
 
 
 def _way_back(passing: PassingLane) -> LaneChange:

@@ -110,7 +110,7 @@ class Planner:
         predicted = self._standing.settled(predicted, self._nudging.stood)
         config, shape = self._config, self._shape
         window = self._reference.window(station, self._reach(station, start.speed))
-        choice = self._passing.step(window, offset, start.speed, predicted.objects)
+        choice = self._passing.step(window, offset, start.speed, predicted)
         if choice is None:
             choice = self._lane_changer.step(window, offset, start.speed, predicted.objects)
         if choice.keeping is not None:

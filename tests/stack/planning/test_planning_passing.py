@@ -3,10 +3,14 @@
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import SHAPE, Actor, Drive, assert_drivable, car, cone, drive, road, straight_points
+from planned_drives import SHAPE, Actor, Drive, assert_drivable, car, cone, drive, predicted, road, straight_points
 
+from dvca_sumo.messages import PREDICTION_TIMES
 from dvca_sumo.roadmap import Route
 from dvca_sumo.roadmap.route import PassingLane
+from dvca_sumo.stack.planning import PlanningConfig
+from dvca_sumo.stack.planning.passing import Passing
+from dvca_sumo.stack.planning.reference import Reference
 
 WIDTH = 3.2  # [m] of a lane
 END = 900.0  # [m] of the lane to pass on
@@ -74,6 +78,18 @@ def test_behind_a_queue_that_may_be_for_where_the_ego_goes_it_comes_back() -> No
     assert lanes(driven) == [0, 1, 0]
     assert driven.fronts[-1] < 430.0
     assert driven.clearances.min() > 1.0
+
+
+@pytest.mark.parametrize("braking", [0.0, 2.0])
+def test_who_is_going_to_be_slow_is_passed_while_there_is_a_gap(braking: float) -> None:
+    """Before the ego is at the end of a queue that it could not leave any more."""
+    ahead = predicted([car(7, 70.0, speed=12.0), car(8, 70.0, WIDTH, speed=12.5)], 0.0)
+    slowing = np.minimum(PREDICTION_TIMES, 2.0)
+    ahead.poses[0, :, 0] -= braking * slowing * (PREDICTION_TIMES - 0.5 * slowing)
+    route, config = beside(), PlanningConfig()
+    window = Reference(route, SHAPE, config).window(40.0, 150.0)
+    choice = Passing(route, SHAPE, config).step(window, 0.0, 13.0, ahead)
+    assert (choice is not None and choice.keeping is not None) == (braking > 0.0)
 
 
 def test_what_only_stands_about_is_passed_within_the_lane_or_next_to_it() -> None:
