@@ -24,6 +24,7 @@ from dvca_sumo.scenario import Scenario, ScenarioError, input_words
 from dvca_sumo.truth import EgoTruth, ObjectsTruth
 from dvca_sumo.world.crowd import Body, Crowd
 from dvca_sumo.world.entry import Entry
+from dvca_sumo.world.footing import Footing
 from dvca_sumo.world.inset import Inset
 from dvca_sumo.world.itinerary import Itinerary
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
@@ -35,7 +36,7 @@ NEVER_TELEPORTED = "dvca.ego"  # vehicle type of an adopted ego
 
 _VEHICLE = (tc.VAR_POSITION, tc.VAR_ANGLE, tc.VAR_SPEED, tc.VAR_LANE_ID)
 # Other variables than for vehicles: results of both kinds arrive in one dictionary, by id.
-_PERSON = (tc.VAR_POSITION3D, tc.VAR_ANGLE, tc.VAR_SPEED, tc.VAR_VEHICLE)
+_PERSON = (tc.VAR_POSITION3D, tc.VAR_ANGLE, tc.VAR_SPEED, tc.VAR_VEHICLE, tc.VAR_ROAD_ID)
 _NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
 _ANY_BRAKING = 1e4  # [m/s^2] SUMO's own driver, overruled, would warn of braking for the arrival at every step
 _MATCHED_WITHIN = 30.0  # [m] of a lane an ego is on the road; SUMO looks at every lane within that
@@ -90,6 +91,7 @@ class Session:
             raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {_in_one_line(error)}") from None
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
+        self._footing = Footing(libsumo.lane.getShape)
         self._adopted: dict[str, _Adopted] = {}  # by ego
         self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
@@ -262,6 +264,7 @@ class Session:
         names: list[str] = []
         motions: list[float] = []
         lanes: list[str] = []
+        edges: dict[int, str] = {}  # by row, of people whose places SUMO leaves open
         for name, values in libsumo.vehicle.getContextSubscriptionResults(ego).items():
             is_person = tc.VAR_POSITION3D in values
             if tc.VAR_POSITION in values and name != ego and abs(values[tc.VAR_POSITION][0]) < _NOWHERE:
@@ -272,10 +275,17 @@ class Session:
                 lanes.append(sys.intern(values[tc.VAR_LANE_ID]))  # met again in thousands of moments
             if is_person and not values[tc.VAR_VEHICLE]:
                 is_mixed = tc.VAR_POSITION in values
+                if self._footing.concerns(self._person(name), values[tc.VAR_ROAD_ID]):
+                    edges[len(names)] = values[tc.VAR_ROAD_ID]
                 names.append(self._person(name))
                 motions += values[tc.VAR_POSITION3D][:2]
                 motions += _turn(libsumo.person, name) if is_mixed else (values[tc.VAR_ANGLE], values[tc.VAR_SPEED])
                 lanes.append("")
+        if edges:
+            people, places = [names[row] for row in edges], np.array([motions[4 * row : 4 * row + 2] for row in edges])
+            placed = self._footing.placed(self.time, people, list(edges.values()), places).tolist()
+            for row, place in zip(edges, placed, strict=True):
+                motions[4 * row : 4 * row + 2] = place
         return self._crowds[ego].seen(self.time, names, motions, lanes, self._bodies)
 
     def signals(self, signal_ids: tuple[str, ...]) -> dict[str, SignalColour]:

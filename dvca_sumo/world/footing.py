@@ -1,0 +1,64 @@
+"""People within the ground that SUMO has them on.
+
+At junctions SUMO has people on walking areas stand and walk beside those, on the road, as well: those who wait at a
+crossing, in a row along its whole width, stand where its corner reaches over the kerb, in the middle of the lane of who
+turns there. Its own drivers drive through them; nobody else gets past. Here they stand on the walking area, and come
+back to SUMO's places on their way across.
+"""
+
+import math
+import re
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import shapely
+
+from dvca_sumo.messages import Floats
+
+_WALKING_AREA = re.compile(r":.*_w\d+")  # how SUMO names them
+_FASTEST = 1.0  # [m/s] at which somebody moves away from SUMO's place, and back to it
+
+Outline = Sequence[tuple[float, float]]
+
+
+class Footing:
+    """How far everybody is from SUMO's place, at one world step after another."""
+
+    def __init__(self, outline_of: Callable[[str], Outline]) -> None:
+        """`outline_of` gives the outline of a lane of a walking area."""
+        self._outline_of = outline_of
+        self._areas: dict[str, shapely.Geometry] = {}
+        self._shifts: dict[str, tuple[float, tuple[float, float]]] = {}  # by person: when [s], and how far [m]
+
+    def concerns(self, person: str, edge: str) -> bool:
+        """Whether a person may be elsewhere than at SUMO's place."""
+        return person in self._shifts or _WALKING_AREA.fullmatch(edge) is not None
+
+    def placed(self, time: float, people: Sequence[str], edges: Sequence[str], places: Floats) -> Floats:
+        """Where `people` are (n, 2) [m] who are concerned, at `time` [s]; SUMO's `places` (n, 2) are on the `edges`."""
+        areas = [self._area(edge) for edge in edges]
+        is_on_area = ~shapely.is_empty(areas)
+        ways = shapely.get_coordinates(shapely.shortest_line(areas, shapely.points(places))).reshape(-1, 2, 2)
+        wanted = np.zeros_like(places)
+        wanted[is_on_area] = ways[:, 0] - ways[:, 1]
+        shifts = [self._shift(time, *one) for one in zip(people, wanted.tolist(), strict=True)]
+        for person, shift, stays in zip(people, shifts, is_on_area.tolist(), strict=True):
+            self._shifts[person] = (time, shift)
+            if shift == (0.0, 0.0) and not stays:
+                del self._shifts[person]
+        placed: Floats = places + np.array(shifts)
+        return placed
+
+    def _shift(self, time: float, person: str, wanted: list[float]) -> tuple[float, float]:
+        seen, before = self._shifts.get(person, (time, (0.0, 0.0)))
+        way, most = math.dist(before, wanted), _FASTEST * (time - seen)
+        share = most / way if way > most else 1.0
+        return before[0] + share * (wanted[0] - before[0]), before[1] + share * (wanted[1] - before[1])
+
+    def _area(self, edge: str) -> shapely.Geometry:
+        """A walking area; empty for any other edge."""
+        if edge not in self._areas:
+            is_area = _WALKING_AREA.fullmatch(edge) is not None
+            outline = self._outline_of(f"{edge}_0") if is_area else ()
+            self._areas[edge] = shapely.buffer(shapely.Polygon(outline), 0.0) if len(outline) > 2 else shapely.Polygon()
+        return self._areas[edge]
