@@ -1,0 +1,67 @@
+"""People on the ground that SUMO has them on, whatever their places."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from small_scenarios import scenario_file
+from watched_world import STEP, asked, watched
+
+from dvca_sumo.messages import ObjectClass
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.world.footing import Footing
+
+AREA, CROSSING = ":J_w0", ":J_c0"
+SQUARE = {f"{AREA}_0": ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))}
+WITH_PEOPLE = ("--sidewalks.guess.from-permissions", "--crossings.guess", "--default-junction-type=traffic_light")
+STANDING = '<trip id="ego" from="B1C1" to="B1C1" depart="0" departPos="20" departSpeed="0" departLane="1"/>'
+CROWD = "".join(
+    f'<person id="{number}" depart="{number}" departPos="110"><walk edges="A1B1 B1{end}1" arrivalPos="60"/></person>'
+    for number, end in enumerate("CCCCCCCC")
+)
+
+
+def follow(footing: Footing, steps: int, edge: str, place: tuple[float, float], begin: int = 0) -> list[list[float]]:
+    """Where somebody is at each of so many steps whom SUMO leaves at one place."""
+    places = np.array([place])
+    return [footing.placed(STEP * row, ["p"], [edge], places)[0].tolist() for row in range(begin, begin + steps)]
+
+
+def test_who_stands_beside_a_walking_area_comes_to_its_edge_and_back_at_a_walk() -> None:
+    footing = Footing(SQUARE.__getitem__)
+    there = np.array(follow(footing, 20, AREA, (4.8, 2.0)))
+    assert there[0].tolist() == [4.8, 2.0]
+    assert there[-1] == pytest.approx([4.0, 2.0])
+    assert np.abs(np.diff(there, axis=0)).max() <= 1.0 * STEP + 1e-9
+    assert footing.concerns("p", CROSSING)
+    back = np.array(follow(footing, 20, CROSSING, (4.8, 2.0), begin=20))
+    assert back[-1].tolist() == [4.8, 2.0]
+    assert np.abs(np.diff(back, axis=0)).max() <= 1.0 * STEP + 1e-9
+    assert not footing.concerns("p", CROSSING)
+
+
+def test_who_is_on_the_area_stays_where_sumo_has_it() -> None:
+    footing = Footing(SQUARE.__getitem__)
+    assert follow(footing, 5, AREA, (3.9, 2.0)) == [[3.9, 2.0]] * 5
+
+
+def test_who_waits_at_a_crossing_does_not_stand_in_the_way_of_those_who_turn(
+    tmp_path: Path, grid_file: Callable[..., Path]
+) -> None:
+    net, steps = grid_file(*WITH_PEOPLE), 450
+    config = scenario_file(tmp_path, net, STANDING + CROWD)
+
+    def places(libsumo: Any) -> list[tuple[float, float]]:
+        return [libsumo.person.getPosition(name) for name in libsumo.person.getIDList()]
+
+    turning = [lane for lane in RoadMap.load(net, "passenger").lanes.values() if lane.is_drivable and lane.is_internal]
+    lines = shapely.MultiLineString([lane.line.points for lane in turning])
+    told = shapely.distance(lines, shapely.points(asked(config, steps, places)))
+    objects = watched(config, steps)[-1].objects
+    people = objects.classes == ObjectClass.PEDESTRIAN
+    seen = shapely.distance(lines, shapely.points(objects.boxes[people, :2]))
+    assert told.min() < 1.1
+    assert seen.min() > 1.25
