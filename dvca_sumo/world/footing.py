@@ -16,6 +16,7 @@ import shapely
 from dvca_sumo.messages import Floats
 
 _WALKING_AREA = re.compile(r":.*_w\d+")  # how SUMO names them
+_FROM_KERB = 0.25  # [m] the middle of a body, where the area is wide enough
 _FASTEST = 1.0  # [m/s] at which somebody moves away from SUMO's place, and back to it
 
 Outline = Sequence[tuple[float, float]]
@@ -27,7 +28,7 @@ class Footing:
     def __init__(self, outline_of: Callable[[str], Outline]) -> None:
         """`outline_of` gives the outline of a lane of a walking area."""
         self._outline_of = outline_of
-        self._areas: dict[str, shapely.Geometry] = {}
+        self._areas: dict[str, tuple[shapely.Geometry, shapely.Geometry]] = {}
         self._shifts: dict[str, tuple[float, tuple[float, float]]] = {}  # by person: when [s], and how far [m]
 
     def concerns(self, person: str, edge: str) -> bool:
@@ -36,11 +37,12 @@ class Footing:
 
     def placed(self, time: float, people: Sequence[str], edges: Sequence[str], places: Floats) -> Floats:
         """Where `people` are (n, 2) [m] who are concerned, at `time` [s]; SUMO's `places` (n, 2) are on the `edges`."""
-        areas = [self._area(edge) for edge in edges]
-        is_on_area = ~shapely.is_empty(areas)
-        ways = shapely.get_coordinates(shapely.shortest_line(areas, shapely.points(places))).reshape(-1, 2, 2)
+        areas, insides = (np.array(parts) for parts in zip(*map(self._area, edges), strict=True))
+        points, is_on_area = shapely.points(places), ~shapely.is_empty(areas)
+        beside = is_on_area & ~shapely.intersects(areas, points)
+        ways = shapely.get_coordinates(shapely.shortest_line(insides[beside], points[beside])).reshape(-1, 2, 2)
         wanted = np.zeros_like(places)
-        wanted[is_on_area] = ways[:, 0] - ways[:, 1]
+        wanted[beside] = ways[:, 0] - ways[:, 1]
         shifts = [self._shift(time, *one) for one in zip(people, wanted.tolist(), strict=True)]
         for person, shift, stays in zip(people, shifts, is_on_area.tolist(), strict=True):
             self._shifts[person] = (time, shift)
@@ -55,10 +57,12 @@ class Footing:
         share = most / way if way > most else 1.0
         return before[0] + share * (wanted[0] - before[0]), before[1] + share * (wanted[1] - before[1])
 
-    def _area(self, edge: str) -> shapely.Geometry:
-        """A walking area; empty for any other edge."""
+    def _area(self, edge: str) -> tuple[shapely.Geometry, shapely.Geometry]:
+        """A walking area, and where the middles of bodies are on it; empty for any other edge."""
         if edge not in self._areas:
             is_area = _WALKING_AREA.fullmatch(edge) is not None
             outline = self._outline_of(f"{edge}_0") if is_area else ()
-            self._areas[edge] = shapely.buffer(shapely.Polygon(outline), 0.0) if len(outline) > 2 else shapely.Polygon()
+            area = shapely.buffer(shapely.Polygon(outline), 0.0) if len(outline) > 2 else shapely.Polygon()
+            inside = shapely.buffer(area, -_FROM_KERB)
+            self._areas[edge] = area, area if shapely.is_empty(inside) else inside
         return self._areas[edge]
