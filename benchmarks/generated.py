@@ -2,9 +2,9 @@
 
     python benchmarks/generated.py FOLDER [--nets all_way_stop,left_hand] [--egos 60] [--seed 1] [--jobs 1]
 
-Each net is built in FOLDER/NAME with its traffic (`randomTrips.py` of SUMO, turns back at dead ends included), and
-screened as `dvca-sumo screen` does it, between 100 s and 1100 s. Prints a line for each; which violations there were
-and how to see them stands in FOLDER/NAME/out/screening.txt.
+Each net is built in FOLDER/NAME with its traffic (`randomTrips.py` of SUMO, turns back at dead ends included; people
+on foot where there are pavements), and screened as `dvca-sumo screen` does it, between 100 s and 1100 s. Prints a line
+for each; which violations there were and how to see them stands in FOLDER/NAME/out/screening.txt.
 """
 
 import argparse
@@ -17,12 +17,14 @@ import sumo
 import sumolib
 
 TYPE, LANES = "--default.junctions.type", "--default.lanenumber=2"
+SIGNALS, WALKS = "--default-junction-type=traffic_light", ["--sidewalks.guess.from-permissions", "--crossings.guess"]
 SPIDER = ["--spider", "--spider.arm-number=7", "--spider.circle-number=5", "--spider.space-radius=120"]
 NETS = {
     "all_way_stop": (1.5, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=allway_stop"]),
     "left_hand": (1.2, ["--grid", "--grid.number=5", "--grid.length=180", "--lefthand", LANES, "--turn-lanes=1"]),
     "right_before_left": (1.2, [*SPIDER, f"{TYPE}=right_before_left"]),
-    "signals": (0.8, ["--rand", "--rand.iterations=120", LANES, "--default-junction-type=traffic_light"]),
+    "signals": (0.8, ["--rand", "--rand.iterations=120", LANES, SIGNALS]),
+    "people": (1.5, ["--grid", "--grid.number=5", "--grid.length=150", SIGNALS, *WALKS]),
 }
 BEGIN, END = "100", "1100"  # [s]
 SCREEN = "from dvca_sumo.cli import main; main()"
@@ -32,13 +34,19 @@ def built(folder: Path, period: float, options: list[str]) -> Path:
     """A configuration of the net and its traffic, a trip every `period` [s]."""
     folder.mkdir(parents=True, exist_ok=True)
     generate = [sumolib.checkBinary("netgenerate"), *options, "--seed=5", "-o", "net.net.xml"]
-    trips = [sys.executable, str(Path(sumo.SUMO_HOME, "tools", "randomTrips.py")), "-n", "net.net.xml"]
-    trips += ["-o", "trips.xml", "-r", "routes.rou.xml", "-e", "1200", "-p", str(period), "--seed=7", "--validate"]
-    for command in (generate, [*trips, "--fringe-factor=3", "--min-distance=300"]):
+    trips = [sys.executable, str(Path(sumo.SUMO_HOME, "tools", "randomTrips.py")), "-n", "net.net.xml", "-e", "1200"]
+    cars = ["-o", "trips.xml", "-r", "routes.rou.xml", "-p", str(period), "--seed=7", "--validate"]
+    commands = [generate, [*trips, *cars, "--fringe-factor=3", "--min-distance=300"]]
+    routes = "routes.rou.xml"
+    if WALKS[0] in options:
+        people = ["-o", "people.xml", "-r", "people.rou.xml", "-p", "1", "--seed=8", "--pedestrians", "--prefix=p"]
+        commands.append([*trips, *people, "--max-distance=600"])
+        routes += ",people.rou.xml"
+    for command in commands:
         subprocess.run(command, cwd=folder, check=True, capture_output=True)  # noqa: S603 - SUMO's own programs
     config = folder / "run.sumocfg"
     config.write_text(
-        '<configuration><input><net-file value="net.net.xml"/><route-files value="routes.rou.xml"/></input>'
+        f'<configuration><input><net-file value="net.net.xml"/><route-files value="{routes}"/></input>'
         '<time><step-length value="0.1"/></time></configuration>'
     )
     return config
