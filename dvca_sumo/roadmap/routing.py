@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.polyline import Floats, Polyline
-from dvca_sumo.roadmap.areas import area_of, corners, narrowed, widened
+from dvca_sumo.roadmap.areas import area_of, widened
 from dvca_sumo.roadmap.bounds import Bounds, bounds, lane_change
 from dvca_sumo.roadmap.drawing import Change, Drawing, Stretch
 from dvca_sumo.roadmap.extending import extended
@@ -23,7 +23,6 @@ from dvca_sumo.roadmap.steering import PART, WHOLE, steered, straying, unsteerab
 _BEFORE = 20.0  # [m] of lane shown behind the start, as far as there is any
 _RUN_UP = 10.0  # [m] of line behind the start in any case: the rear axle needs a line under it
 _BEYOND = 100.0  # [m] shown behind the destination, as far as the net goes on
-_OFF_CORNER = 0.8  # [m] that bodies keep off the ground of people at the corners of junctions: those stand on its edge
 _SETTLED = 10.0  # [m] at most is waited before a lane change, after a junction or the start
 
 
@@ -186,31 +185,11 @@ def _steerable(net: NetContents, plan: _Plan, points: Floats, along: Floats, beg
         along = np.interp(stations, line.stations, along)
         line = Polyline(points)
         room = _bounds(net, plan, line, along + begin)
-    left, right = _off_corners(net, plan, line, along + begin, room)
-    out = straying(line, left, right)
+    out = straying(line, room.lane_left, room.lane_right)
     if out.any():
-        points, stations = steered(line, out, left, right, PART)
+        points, stations = steered(line, out, room.lane_left, room.lane_right, PART)
         along = np.interp(stations, line.stations, along)
     return points, along
-
-
-def _off_corners(net: NetContents, plan: _Plan, line: Polyline, along: Floats, room: Bounds) -> tuple[Floats, Floats]:
-    """The lane's edges to the left and right; at the corners of junctions the lane makes room for people who wait."""
-    left, right = room.lane_left.copy(), room.lane_right.copy()
-    headings = line.poses(line.stations)[:, 2]
-    for passage in plan.passages:
-        junction = net.junctions[passage.movement.junction]
-        if not junction.walking:
-            continue
-        first, last = np.searchsorted(along, (passage.begin, passage.end))
-        rows = slice(int(first), int(last))
-        lanes = [net.lanes[name].line.points for movement in junction.movements for name in movement.internal]
-        ground = corners(junction.walking.values(), lanes)
-        for edge, other in ((left, right), (right, left)):
-            moved = narrowed(edge[rows], line.points[rows], headings[rows], ground, _OFF_CORNER) - edge[rows]
-            edge[rows] += moved
-            other[rows] += moved
-    return left, right
 
 
 def _bounds(net: NetContents, plan: _Plan, line: Polyline, along: Floats) -> Bounds:
