@@ -14,18 +14,17 @@ import numpy as np
 import shapely
 
 from dvca_sumo.messages import Floats
+from dvca_sumo.roadmap.areas import Shape, polygon
 
 _WALKING_AREA = re.compile(r":.*_w\d+")  # how SUMO names them
 _FROM_KERB = 0.25  # [m] the middle of a body, where the area is wide enough
 _FASTEST = 1.0  # [m/s] at which somebody moves away from SUMO's place, and back to it
 
-Outline = Sequence[tuple[float, float]]
-
 
 class Footing:
     """How far everybody is from SUMO's place, at one world step after another."""
 
-    def __init__(self, outline_of: Callable[[str], Outline]) -> None:
+    def __init__(self, outline_of: Callable[[str], Shape]) -> None:
         """`outline_of` gives the outline of a lane of a walking area."""
         self._outline_of = outline_of
         self._areas: dict[str, tuple[shapely.Geometry, shapely.Geometry]] = {}
@@ -61,8 +60,7 @@ class Footing:
         """A walking area, and where the middles of bodies are on it; empty for any other edge."""
         if edge not in self._areas:
             is_area = _WALKING_AREA.fullmatch(edge) is not None
-            outline = self._outline_of(f"{edge}_0") if is_area else ()
-            area = shapely.buffer(shapely.Polygon(outline), 0.0) if len(outline) > 2 else shapely.Polygon()
+            area = polygon(self._outline_of(f"{edge}_0") if is_area else ())
             inside = shapely.buffer(area, -_FROM_KERB)
             self._areas[edge] = area, area if shapely.is_empty(inside) else inside
         return self._areas[edge]

@@ -275,9 +275,10 @@ class Session:
                 lanes.append(sys.intern(values[tc.VAR_LANE_ID]))  # met again in thousands of moments
             if is_person and not values[tc.VAR_VEHICLE]:
                 is_mixed = tc.VAR_POSITION in values
-                if self._footing.concerns(self._person(name), values[tc.VAR_ROAD_ID]):
-                    edges[len(names)] = values[tc.VAR_ROAD_ID]
-                names.append(self._person(name))
+                person, edge = self._person(name), values[tc.VAR_ROAD_ID]
+                if self._footing.concerns(person, edge):
+                    edges[len(names)] = edge
+                names.append(person)
                 motions += values[tc.VAR_POSITION3D][:2]
                 motions += _turn(libsumo.person, name) if is_mixed else (values[tc.VAR_ANGLE], values[tc.VAR_SPEED])
                 lanes.append("")

@@ -19,8 +19,8 @@ SQUARE = {f"{AREA}_0": ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))}
 WITH_PEOPLE = ("--sidewalks.guess.from-permissions", "--crossings.guess", "--default-junction-type=traffic_light")
 STANDING = '<trip id="ego" from="B1C1" to="B1C1" depart="0" departPos="20" departSpeed="0" departLane="1"/>'
 CROWD = "".join(
-    f'<person id="{number}" depart="{number}" departPos="110"><walk edges="A1B1 B1{end}1" arrivalPos="60"/></person>'
-    for number, end in enumerate("CCCCCCCC")
+    f'<person id="{number}" depart="{number}" departPos="110"><walk edges="A1B1 B1C1" arrivalPos="60"/></person>'
+    for number in range(8)
 )
 
 

@@ -93,11 +93,10 @@ class Gaps:
     ) -> bool:
         """Whether nobody on the lane has to brake more than a little when the ego is there; hurried, at once.
 
-        Headways need not be there before the change is over: who is faster than who follows gets away until then.
-
         That is where the change can begin, those on the lane keeping their speeds until then; pressed, where
         the body gets over the marking. Thus it takes up what those who stop for it offer. But who passes before that
-        hides others who follow close behind.
+        hides others who follow close behind. Headways need not be there before the change is over: who is faster than
+        who follows gets away until then.
         """
         if not lane.tracks:
             return True
