@@ -8,6 +8,7 @@ import numpy as np
 from dvca_sumo.geometry.polyline import Floats, Polyline
 from dvca_sumo.roadmap.areas import area_of, widened
 from dvca_sumo.roadmap.bounds import Bounds, bounds, lane_change
+from dvca_sumo.roadmap.corners import off_corners
 from dvca_sumo.roadmap.drawing import Change, Drawing, Stretch
 from dvca_sumo.roadmap.extending import extended
 from dvca_sumo.roadmap.lane_sequence import Leg, change_length, lane_sequence
@@ -185,9 +186,12 @@ def _steerable(net: NetContents, plan: _Plan, points: Floats, along: Floats, beg
         along = np.interp(stations, line.stations, along)
         line = Polyline(points)
         room = _bounds(net, plan, line, along + begin)
-    out = straying(line, room.lane_left, room.lane_right)
+    ends = [np.searchsorted(along + begin, (one.begin, one.end)).tolist() for one in plan.passages]
+    passages = [(one.movement, slice(*rows)) for one, rows in zip(plan.passages, ends, strict=True)]
+    left, right = off_corners(net, line, passages, (room.lane_left, room.lane_right))
+    out = straying(line, left, right)
     if out.any():
-        points, stations = steered(line, out, room.lane_left, room.lane_right, PART)
+        points, stations = steered(line, out, left, right, PART)
         along = np.interp(stations, line.stations, along)
     return points, along
 

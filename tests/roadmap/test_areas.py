@@ -1,10 +1,16 @@
 """How far a road reaches on a junction."""
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
+import shapely
+import sumolib
 
 from dvca_sumo.geometry.polyline import Floats
-from dvca_sumo.roadmap.areas import area_of, widened
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.roadmap.areas import area_of, narrowed, polygon, widened
 
 SQUARE = [(0.0, -3.0), (10.0, -3.0), (10.0, 20.0), (0.0, 20.0)]
 POINTS = np.array([[-1.0, 0.0], [1.0, 0.0], [5.0, 0.0], [9.0, 0.0], [11.0, 0.0]])  # a line east, two of them outside
@@ -53,3 +59,36 @@ def test_an_outline_that_crosses_itself_is_an_area_too() -> None:
     found = edges(1.0, crossed)
     assert np.isfinite(found).all()
     assert (found >= 2.1).all()
+
+
+def test_ground_for_people_moves_an_edge_in_so_that_it_stays_off_it_but_not_across_the_line() -> None:
+    ground = polygon([(4.0, -3.0), (10.0, -3.0), (8.0, -0.2), (4.0, -2.0)])
+    moved = narrowed(np.full(5, -1.6), POINTS, np.zeros(5), ground, 0.5)
+    assert moved == pytest.approx([-1.6, -1.6, -1.05, -1.1, -1.6])
+    assert narrowed(np.full(5, 1.6), POINTS, np.zeros(5), ground, 0.5) == pytest.approx([1.6] * 5)
+    beside = POINTS + np.array([3.0, -0.3])
+    assert narrowed(np.full(5, -1.6), beside, np.zeros(5), ground, 0.5)[2] == 0.0
+
+
+WITH_PEOPLE = ("--sidewalks.guess.from-permissions", "--crossings.guess")
+
+
+def test_a_sharp_turn_keeps_off_the_corner_where_people_wait(grid_file: Callable[..., Path]) -> None:
+    net = grid_file(*WITH_PEOPLE)
+    line = RoadMap.load(net, "passenger").route(("A1B1", "B1B0"), "A1B1_1", 10.0, None, 60.0).line
+    edges = sumolib.net.readNet(str(net), withInternal=True, withPedestrianConnections=True).getEdges()
+    walking = [polygon(edge.getLane(0).getShape()) for edge in edges if edge.getFunction() == "walkingarea"]
+    assert np.abs(line.curvatures).max() < 0.2
+    assert shapely.distance(shapely.union_all(walking), shapely.points(line.points)).min() > 1.1
+
+
+def test_but_not_onto_those_who_turn_beside_it(grid_file: Callable[..., Path]) -> None:
+    roads = RoadMap.load(grid_file(*WITH_PEOPLE, "--default.lanenumber=2", "--turn-lanes=1"), "passenger")
+    line = roads.route(("B0C0", "C0C1"), "B0C0_2", 90.0, "C0C1_2", 30.0).line
+    beside = roads.route(("B0C0", "C0C1"), "B0C0_1", 90.0, "C0C1_1", 30.0).line
+    frames = line.poses(line.stations)
+    ahead = 4.1 * np.column_stack((np.cos(frames[:, 2]), np.sin(frames[:, 2])))
+    across = 0.9 * np.column_stack((np.sin(frames[:, 2]), -np.cos(frames[:, 2])))
+    corners_of_a_car = np.concatenate((line.points + across, line.points + ahead + across))
+    _, offsets = beside.project(corners_of_a_car)
+    assert np.abs(offsets).min() > 1.4
