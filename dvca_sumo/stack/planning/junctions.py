@@ -47,6 +47,7 @@ class Junctions:
         self._exits = [line.exit_station for line in self._lines]
         self._seen: dict[str, tuple[float, SignalColour]] = {}
         self._entered: set[int] = set()  # lines crossed on yellow, for which it was too late to stop
+        self._kept: set[int] = set()  # lines to stop at, decided when it was not
         self._standing: dict[int, float] = {}  # since when the ego stands at a line
         self._released: set[int] = set()  # lines at which standing was enough
         self._watching = [WatchList(line.stop_signs, config) for line in self._lines]
@@ -105,7 +106,8 @@ class Junctions:
         signal = line.signal_id or ""
         colour = self._colour(signal, time)
         needed = speed * speed / (2.0 * max(distance, 0.1))
-        if colour is SignalColour.YELLOW and needed > self._config.yellow_braking:
+        most = self._config.hard_braking if index in self._kept else self._config.yellow_braking
+        if colour is SignalColour.YELLOW and needed > most:
             self._entered.add(index)
         elif distance > 0.0 and needed < self._config.comfort_braking:
             self._entered.discard(index)  # somebody else has made it slow down
@@ -116,8 +118,12 @@ class Junctions:
         if colour in (SignalColour.RED, SignalColour.YELLOW):
             # Who is slow on the junction at red is too late to clear it: the others have green.
             is_late = colour is SignalColour.RED and speed < _ROLLING
-            stop = None if index in self._entered else f"stop {colour.value} {signal}"
-            return stop, line.yields_to | line.crosses if is_late else _NOBODY
+            goes_first = line.yields_to | line.crosses if is_late else _NOBODY
+            if index in self._entered:
+                return None, goes_first
+            self._kept.add(index)
+            return f"stop {colour.value} {signal}", goes_first
+        self._kept.discard(index)
         if colour is not None:
             return None, _NOBODY if colour is SignalColour.GREEN else line.yields_to
         reach = speed * speed / (2.0 * self._config.comfort_braking) + self._config.unseen_reach

@@ -110,6 +110,17 @@ def test_late_yellow_is_passed_even_when_red_follows() -> None:
     assert driven.fronts[-1] > 150.0
 
 
+@pytest.mark.parametrize("yellow", [1.2, 1.6, 2.0, 2.4, 2.8])
+def test_who_begins_to_stop_for_yellow_while_it_speeds_up_does_stop(yellow: float) -> None:
+    def signals(time: float) -> dict[str, SignalColour]:
+        return {"J/2": SignalColour.GREEN if time < yellow else SignalColour.YELLOW}
+
+    route = road(stop_lines=[stop_line(120.0, Control.SIGNAL)])
+    driven = drive(route, 12.0, speed=0.0, station=108.0, signals=signals)
+    has_stopped = driven.fronts[-1] < 120.0
+    assert has_stopped == ("stop yellow J/2" in driven.decisions)
+
+
 def test_green_that_goes_out_of_view_is_remembered_for_a_moment() -> None:
     driven = at_signal({0.0: SignalColour.GREEN})
     route = road(stop_lines=[stop_line(120.0, Control.SIGNAL)])
