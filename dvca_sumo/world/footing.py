@@ -3,7 +3,7 @@
 At junctions SUMO has people on walking areas stand and walk beside those, on the road, as well: those who wait at a
 crossing, in a row along its whole width, stand where its corner reaches over the kerb, in the middle of the lane of who
 turns there. Its own drivers drive through them; nobody else gets past. Here they stand on the walking area, and come
-back to SUMO's places on their way across.
+back to SUMO's places on their way across. Who walks on a walking area, along its edge, does so with all of its body.
 """
 
 import math
@@ -34,14 +34,22 @@ class Footing:
         """Whether a person may be elsewhere than at SUMO's place."""
         return person in self._shifts or _WALKING_AREA.fullmatch(edge) is not None
 
-    def placed(self, time: float, people: Sequence[str], edges: Sequence[str], places: Floats) -> Floats:
-        """Where `people` are (n, 2) [m] who are concerned, at `time` [s]; SUMO's `places` (n, 2) are on the `edges`."""
+    def placed(
+        self, time: float, people: Sequence[str], edges: Sequence[str], places: Floats, headings: Floats
+    ) -> Floats:
+        """Where `people` are (n, 2) [m] who are concerned, at `time` [s].
+
+        SUMO's `places` (n, 2) [m] are on the `edges`; it has them walk, or look, along `headings` (n,) [rad].
+        """
         areas, insides = (np.array(parts) for parts in zip(*map(self._area, edges), strict=True))
         points, is_on_area = shapely.points(places), ~shapely.is_empty(areas)
-        beside = is_on_area & ~shapely.intersects(areas, points)
-        ways = shapely.get_coordinates(shapely.shortest_line(insides[beside], points[beside])).reshape(-1, 2, 2)
+        out = is_on_area & ~shapely.intersects(insides, points)
+        ways = shapely.get_coordinates(shapely.shortest_line(insides[out], points[out])).reshape(-1, 2, 2)
         wanted = np.zeros_like(places)
-        wanted[beside] = ways[:, 0] - ways[:, 1]
+        wanted[out] = ways[:, 0] - ways[:, 1]
+        along = shapely.intersects(areas, points)  # who is on the area leaves it, or comes onto it, at its own pace
+        left = np.column_stack((-np.sin(headings), np.cos(headings)))[along]
+        wanted[along] = (wanted[along] * left).sum(axis=1)[:, None] * left
         shifts = [self._shift(time, *one) for one in zip(people, wanted.tolist(), strict=True)]
         for person, shift, stays in zip(people, shifts, is_on_area.tolist(), strict=True):
             self._shifts[person] = (time, shift)

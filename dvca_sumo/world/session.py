@@ -283,8 +283,9 @@ class Session:
                 motions += _turn(libsumo.person, name) if is_mixed else (values[tc.VAR_ANGLE], values[tc.VAR_SPEED])
                 lanes.append("")
         if edges:
-            people, places = [names[row] for row in edges], np.array([motions[4 * row : 4 * row + 2] for row in edges])
-            placed = self._footing.placed(self.time, people, list(edges.values()), places).tolist()
+            people, motion = [names[row] for row in edges], np.array([motions[4 * row : 4 * row + 3] for row in edges])
+            headings = np.radians(90.0 - motion[:, 2])
+            placed = self._footing.placed(self.time, people, list(edges.values()), motion[:, :2], headings).tolist()
             for row, place in zip(edges, placed, strict=True):
                 motions[4 * row : 4 * row + 2] = place
         return self._crowds[ego].seen(self.time, names, motions, lanes, self._bodies)

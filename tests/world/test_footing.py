@@ -24,10 +24,14 @@ CROWD = "".join(
 )
 
 
-def follow(footing: Footing, steps: int, edge: str, place: tuple[float, float], begin: int = 0) -> list[list[float]]:
+def follow(
+    footing: Footing, steps: int, edge: str, place: tuple[float, float], begin: int = 0, heading: float = 0.0
+) -> list[list[float]]:
     """Where somebody is at each of so many steps whom SUMO leaves at one place."""
-    places = np.array([place])
-    return [footing.placed(STEP * row, ["p"], [edge], places)[0].tolist() for row in range(begin, begin + steps)]
+    place_and_heading = np.array([place]), np.array([heading])
+    return [
+        footing.placed(STEP * row, ["p"], [edge], *place_and_heading)[0].tolist() for row in range(begin, begin + steps)
+    ]
 
 
 def test_who_stands_beside_a_walking_area_comes_onto_it_and_back_at_a_walk() -> None:
@@ -44,8 +48,14 @@ def test_who_stands_beside_a_walking_area_comes_onto_it_and_back_at_a_walk() -> 
 
 
 def test_who_is_on_the_area_stays_where_sumo_has_it() -> None:
-    footing = Footing(SQUARE.__getitem__)
-    assert follow(footing, 5, AREA, (3.9, 2.0)) == [[3.9, 2.0]] * 5
+    assert follow(Footing(SQUARE.__getitem__), 5, AREA, (3.7, 2.0)) == [[3.7, 2.0]] * 5
+
+
+def test_who_walks_along_its_edge_keeps_the_body_on_it_and_who_walks_off_it_is_not_held_back() -> None:
+    along = follow(Footing(SQUARE.__getitem__), 5, AREA, (3.9, 2.0), heading=0.5 * np.pi)
+    assert along[-1] == pytest.approx([3.75, 2.0])
+    assert np.abs(np.diff(along, axis=0)).max() <= 1.0 * STEP + 1e-9
+    assert follow(Footing(SQUARE.__getitem__), 5, AREA, (3.9, 2.0), heading=0.0) == [[3.9, 2.0]] * 5
 
 
 def test_who_waits_at_a_crossing_does_not_stand_in_the_way_of_those_who_turn(
