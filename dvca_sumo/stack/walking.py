@@ -10,15 +10,17 @@ from dvca_sumo.roadmap.walkways import Ground, Walkways, Way, room
 from dvca_sumo.stack.hypotheses import Hypotheses
 
 _HORIZON = float(PREDICTION_TIMES[-1])  # [s]
+_TURNS = np.array([0.5, -0.5, 1.0, -1.0])  # that are looked at, as shares of the widest
 
 
 class WalkingConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How people are taken to walk where the map has ground for them."""
 
-    stepping_off: float = 1.0  # [s] before the kerb people who walk towards it are taken to step off it
+    stepping_off: float = 1.0  # [s] before the kerb people who walk towards it are taken to step off it ...
+    veering: float = 0.4  # ... unless they stay on the pavement by turning no more than that [rad]
     kerb_room: float = 0.3  # [m] before the kerb, people stay who do not step off it
     crossing_outlook: float = 4.0  # [s] before a crossing people who walk towards it may be about to cross
-    crossing_angle: float = 1.0  # [rad] between their way and that to the crossing, at most, unless they are at it
+    crossing_angle: float = 1.0  # [rad] between their way and that to the crossing, at most, or across it at its entry
     at_crossing: float = 1.0  # [m] from its entry
 
 
@@ -46,15 +48,16 @@ class Walking:
         """
         points, velocities = tracked.boxes[rows, :2], tracked.velocities[rows]
         speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+        directions = velocities / speeds[:, None]
         places = self._walkways.under(points)
         ways = speeds * _HORIZON
         kept = [(row, place) for row, place in enumerate(places) if isinstance(place, Ground)]
         crossings = self._crossings(points, velocities, speeds, kept)
         if kept:
             on, grounds = np.array([row for row, _ in kept]), [ground for _, ground in kept]
-            rooms = room(points[on], velocities[on] / speeds[on, None], ways[on], grounds)
-            crosses = np.isin(on, crossings.rows)
-            stays = (rooms < ways[on]) & (crosses | (rooms > speeds[on] * self._config.stepping_off))
+            enough = speeds[on] * self._config.stepping_off
+            directions[on], rooms = self._along_grounds(points[on], directions[on], ways[on], enough, grounds)
+            stays = (rooms < ways[on]) & (np.isin(on, crossings.rows) | (rooms > enough))
             ways[on[stays]] = np.maximum(rooms[stays] - self._config.kerb_room, 0.0)
         lanes = [() if place is None else (place if isinstance(place, str) else place.lane,) for place in places]
         owners = np.concatenate((np.arange(len(rows)), crossings.rows))
@@ -62,9 +65,28 @@ class Walking:
         walked = np.minimum(speeds[:, None] * PREDICTION_TIMES, ways[:, None])
         poses = np.empty((len(owners), len(PREDICTION_TIMES), 3))
         poses[:] = tracked.boxes[rows[owners], None, :3]
-        poses[: len(rows), :, :2] += walked[:, :, None] * (velocities / speeds[:, None])[:, None]
+        poses[: len(rows), :, :2] += walked[:, :, None] * directions[:, None]
         poses[len(rows) :, :, :2] = _crossed(points[crossings.rows], speeds[crossings.rows], crossings)
         return Hypotheses(rows[owners], 1.0 / counts[owners], poses, [*lanes, *crossings.lanes])
+
+    def _along_grounds(
+        self, points: Floats, directions: Floats, lengths: Floats, enough: Floats, grounds: list[Ground]
+    ) -> tuple[Floats, Floats]:
+        """The directions of people, turned where their ground ends before it is `enough` (n,), and the room they have.
+
+        They are turned by as little as leaves more than that, if anything does. Lengths are in m.
+        """
+        directions, rooms = directions.copy(), room(points, directions, lengths, grounds)
+        for turn in self._config.veering * _TURNS:
+            short = (rooms <= enough).nonzero()[0]
+            if not short.size:
+                break
+            along, across = directions[short].T
+            turned = np.cos(turn) * directions[short] + np.sin(turn) * np.column_stack((-across, along))
+            found = room(points[short], turned, lengths[short], [grounds[row] for row in short.tolist()])
+            is_enough = found > enough[short]
+            directions[short[is_enough]], rooms[short[is_enough]] = turned[is_enough], found[is_enough]
+        return directions, rooms
 
     def _crossings(
         self, points: Floats, velocities: Floats, speeds: Floats, kept: list[tuple[int, Ground]]
@@ -76,9 +98,9 @@ class Walking:
         config, rows = self._config, np.array([row for row, _, _ in found])
         entries, across = _entries(points[rows], [way for _, _, way in found])
         gaps, own, velocities = entries - points[rows], speeds[rows], velocities[rows]
-        distances = np.hypot(gaps[:, 0], gaps[:, 1])
-        towards = np.einsum("ij,ij->i", gaps, velocities) > np.cos(config.crossing_angle) * distances * own
-        towards |= (distances < config.at_crossing) & (np.einsum("ij,ij->i", across, velocities) > 0.0)
+        distances, least = np.hypot(gaps[:, 0], gaps[:, 1]), np.cos(config.crossing_angle) * own
+        towards = np.einsum("ij,ij->i", gaps, velocities) > least * distances
+        towards |= (distances < config.at_crossing) & (np.einsum("ij,ij->i", across, velocities) > least)
         used = (towards & (distances < config.crossing_outlook * own)).nonzero()[0]
         lanes: list[tuple[str, ...]] = [(found[one][1], found[one][2].lane) for one in used.tolist()]
         return _Crossings(rows[used], lanes, entries[used], across[used])

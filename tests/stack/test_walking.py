@@ -83,6 +83,15 @@ def test_aslant_to_the_kerb_they_stay_on_the_pavement(roadmap: RoadMap) -> None:
     assert kerb - 0.4 < found.poses[0, -1, 1] < kerb
 
 
+def test_at_the_kerb_and_nearly_along_it_they_stay_on_the_pavement(roadmap: RoadMap) -> None:
+    place, heading, _ = pavement(roadmap)
+    kerb = float(place[1]) + 1.0
+    found = walking(roadmap, np.array([place[0], kerb - 0.3]), heading + 0.3)
+    assert found.probabilities.tolist() == [1.0]
+    assert found.poses[0, :, 1].max() < kerb
+    assert np.hypot(*(found.poses[0, 5, :2] - found.poses[0, 0, :2])) == pytest.approx(SPEED * PREDICTION_TIMES[5])
+
+
 def test_about_to_step_off_the_pavement_they_are_taken_to_cross_the_road(roadmap: RoadMap) -> None:
     place, _, _ = pavement(roadmap)
     found = walking(roadmap, place, math.pi / 2.0)
@@ -111,6 +120,14 @@ def test_away_from_a_crossing_they_do_not_use_it(roadmap: RoadMap) -> None:
     across = (end - begin) / np.hypot(*(end - begin))
     place = begin - 1.5 * across
     assert all(lanes[-1] != lane for lanes in walking(roadmap, place, towards(begin, place)).lanes)
+
+
+def test_past_the_entry_of_a_crossing_they_do_not_use_it(roadmap: RoadMap) -> None:
+    lane, begin, end = crossing(roadmap)
+    across = (end - begin) / np.hypot(*(end - begin))
+    past = towards(begin, end) - 1.3
+    place = begin - 0.8 * across
+    assert all(lanes[-1] != lane for lanes in walking(roadmap, place, past).lanes)
 
 
 def test_on_a_crossing_they_go_straight_on(roadmap: RoadMap) -> None:
