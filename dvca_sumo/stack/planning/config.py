@@ -15,7 +15,8 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     astray_speed: float = 3.0  # [m/s] while the ego points elsewhere than any smooth path back to the line
 
     # Limits of motion.
-    cruise_fraction: float = 0.97  # of the speed limit: room for what control overshoots
+    cruise_fraction: float = 0.97  # of the speed limit: room for what control overshoots ...
+    cruise_room: float = 0.42  # [m/s] ... which is no more than that, however fast
     acceleration: float = 2.0  # [m/s^2] comfort
     braking: float = 1.2  # [m/s^2] b of the intelligent driver model: stops then take about twice that
     slowing: float = 2.0  # [m/s^2] before curves and lower limits

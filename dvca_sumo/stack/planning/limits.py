@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from dvca_sumo.geometry.boxes import corners
-from dvca_sumo.messages import Integers, ObjectClass, VehicleShape
+from dvca_sumo.messages import Floats, Integers, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Control
 from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
@@ -43,7 +43,7 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
     """
     path = graph.path
     caps = np.minimum(
-        config.cruise_fraction * graph.window.speed_limits[BEHIND:],
+        cruise_speeds(graph.window.speed_limits[BEHIND:], config),
         np.sqrt(config.lateral_acceleration / np.maximum(np.abs(path.curvatures), 1e-4)),
     )
     changes = np.abs(path.curvatures[_STEERED:] - path.curvatures[:-_STEERED])  # of as many metres each
@@ -70,6 +70,11 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
             caps[part] = np.minimum(caps[part], config.peering_speed)
     slowed: list[float] = slowed_before(caps, path.arcs, config.slowing).tolist()
     return slowed
+
+
+def cruise_speeds(limits: Floats, config: PlanningConfig) -> Floats:
+    """The speeds (n,) to drive at under speed `limits` (n,) [m/s]."""
+    return np.maximum(config.cruise_fraction * limits, limits - config.cruise_room)
 
 
 def _waiting(graph: Graph, views: list[LineView]) -> list[int]:

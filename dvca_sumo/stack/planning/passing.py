@@ -22,6 +22,7 @@ from dvca_sumo.stack.planning.lane_changing import (
     letting_in,
 )
 from dvca_sumo.stack.planning.lane_gaps import Gaps, Neighbours
+from dvca_sumo.stack.planning.limits import cruise_speeds
 from dvca_sumo.stack.planning.reference import BEHIND, Window
 
 _BESIDE, _OWN = 0, 1  # lanes of the way back
@@ -57,7 +58,7 @@ class Passing:
         config, shape = self._config, self._shape
         leads_on = self._lanes[self._next].leads_on
         nose = window.station + shape.front
-        wanted = config.cruise_fraction * float(window.speed_limits[BEHIND])
+        wanted = float(cruise_speeds(window.speed_limits[BEHIND], config))
         halt = min((begin for begin, end in way.junctions if end > nose), default=way.latest_station)
         is_short = halt - nose < config.passing_room * wanted
         if self._lane == self._target == _OWN and is_short:

@@ -31,6 +31,13 @@ def test_a_lower_limit_is_kept_from_where_the_front_bumper_enters_it() -> None:
     assert driven.speeds[~inside].max() > 13.0
 
 
+@pytest.mark.parametrize("limit", [LIMIT, 33.3])
+def test_however_high_the_limit_no_more_is_left_to_it_than_control_overshoots(limit: float) -> None:
+    driven = drive(road(limit=limit), 5.0, speed=limit - 1.0)
+    assert limit - 0.45 < driven.speeds[-1]
+    assert driven.speeds.max() < limit
+
+
 def _with_limits(route: Route, limits: Floats) -> Route:
     return msgspec.structs.replace(route, speed_limits=limits)
 
