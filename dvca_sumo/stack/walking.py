@@ -44,7 +44,8 @@ class Walking:
         """The futures of people `rows`, who move.
 
         Who is on a pavement walks on along it, stays at its kerb, and may use each crossing ahead, all equally likely;
-        who is about to step off it, who is on the road or on a crossing, goes straight on.
+        who is about to step off it, whatever slight turn it makes, who is on the road or on a crossing, goes straight
+        on.
         """
         points, velocities = tracked.boxes[rows, :2], tracked.velocities[rows]
         speeds = np.hypot(velocities[:, 0], velocities[:, 1])
@@ -72,9 +73,9 @@ class Walking:
     def _along_grounds(
         self, points: Floats, directions: Floats, lengths: Floats, enough: Floats, grounds: list[Ground]
     ) -> tuple[Floats, Floats]:
-        """The directions of people, turned where their ground ends before it is `enough` (n,), and the room they have.
+        """Directions (n, 2) of people, turned where the ground ends within `enough` (n,), and how far they get on it.
 
-        They are turned by as little as leaves more than that, if anything does. Lengths are in m.
+        They are turned by as little as gets them farther than that, if anything does. Lengths are in m.
         """
         directions, rooms = directions.copy(), room(points, directions, lengths, grounds)
         for turn in self._config.veering * _TURNS:

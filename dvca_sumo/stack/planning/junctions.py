@@ -47,7 +47,7 @@ class Junctions:
         self._exits = [line.exit_station for line in self._lines]
         self._seen: dict[str, tuple[float, SignalColour]] = {}
         self._entered: set[int] = set()  # lines crossed on yellow, for which it was too late to stop
-        self._kept: set[int] = set()  # lines to stop at, decided when it was not
+        self._kept: set[int] = set()  # lines that it has begun to stop at on yellow or red
         self._standing: dict[int, float] = {}  # since when the ego stands at a line
         self._released: set[int] = set()  # lines at which standing was enough
         self._watching = [WatchList(line.stop_signs, config) for line in self._lines]
