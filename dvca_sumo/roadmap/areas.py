@@ -22,10 +22,11 @@ def area_of(
     """
     lines = [shapely.LineString(line) for line, _ in lanes]
     strips = shapely.buffer(lines, [0.5 * width for _, width in lanes], cap_style="flat")
-    return shapely.union_all([polygon(outline).difference(pavements(walking, [line for line, _ in lanes])), *strips])
+    corners = walking_corners(walking, [line for line, _ in lanes])
+    return shapely.union_all([polygon(outline).difference(corners), *strips])
 
 
-def pavements(walking: Iterable[Shape], lanes: Iterable[Floats]) -> shapely.Geometry:
+def walking_corners(walking: Iterable[Shape], lanes: Iterable[Floats]) -> shapely.Geometry:
     """The `walking` areas of a junction beside its vehicles' `lanes`, the centre lines (n, 2) of which cross none."""
     driven = shapely.MultiLineString([shapely.LineString(line) for line in lanes])
     return shapely.union_all([area for area in map(polygon, walking) if not driven.intersects(area)])

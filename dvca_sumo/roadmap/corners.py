@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from dvca_sumo.geometry.polyline import Floats, Polyline
-from dvca_sumo.roadmap.areas import narrowed, pavements
+from dvca_sumo.roadmap.areas import narrowed, walking_corners
 from dvca_sumo.roadmap.lanes import Movement
 from dvca_sumo.roadmap.reading import NetContents
 
@@ -30,7 +30,7 @@ def off_corners(
         if not junction.walking:
             continue
         lanes = [net.lanes[name].line.points for other in junction.movements for name in other.internal]
-        ground = pavements(junction.walking.values(), lanes)
+        ground = walking_corners(junction.walking.values(), lanes)
         beside = shapely.MultiLineString(_beside(net, movement, junction.movements))
         points, headings, stations = line.points[rows], poses[rows, 2], line.stations[rows]
         swept = np.stack([stations.searchsorted(stations + reach) for reach in (-_SWEPT, _SWEPT)], axis=1).tolist()

@@ -186,8 +186,7 @@ def _steerable(net: NetContents, plan: _Plan, points: Floats, along: Floats, beg
         along = np.interp(stations, line.stations, along)
         line = Polyline(points)
         room = _bounds(net, plan, line, along + begin)
-    ends = [np.searchsorted(along + begin, (one.begin, one.end)).tolist() for one in plan.passages]
-    passages = [(one.movement, slice(*rows)) for one, rows in zip(plan.passages, ends, strict=True)]
+    passages = [(passage.movement, _rows(passage, along + begin)) for passage in plan.passages]
     left, right = off_corners(net, line, passages, (room.lane_left, room.lane_right))
     out = straying(line, left, right)
     if out.any():
@@ -207,13 +206,18 @@ def _on_junctions(
     """The road's edges to the left and to the right of `line`; on junctions their area counts."""
     edges = edges_of.road_left.copy(), edges_of.road_right.copy()
     for passage in passages:
-        first, last = np.searchsorted(line.stations, (passage.begin, passage.end))
-        rows, junction = slice(int(first), int(last)), net.junctions[passage.movement.junction]
+        rows, junction = _rows(passage, line.stations), net.junctions[passage.movement.junction]
         lanes = [net.lanes[name] for movement in junction.movements for name in movement.internal]
         area = area_of(junction.outline, junction.walking.values(), [(lane.line.points, lane.width) for lane in lanes])
         for edge in edges:
             edge[rows] = widened(edge[rows], line.points[rows], line.headings[rows], area)
     return _fixed(edges[0]), _fixed(edges[1])
+
+
+def _rows(passage: _Passage, stations: Floats) -> slice:
+    """Which of the points at `stations` [m], of the line that the passage's own are on, lie on its junction."""
+    first, last = np.searchsorted(stations, (passage.begin, passage.end))
+    return slice(int(first), int(last))
 
 
 def _changes(plan: _Plan, line: Polyline, along: Floats) -> list[Change]:

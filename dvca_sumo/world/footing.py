@@ -43,13 +43,14 @@ class Footing:
         """
         areas, insides = (np.array(parts) for parts in zip(*map(self._area, edges), strict=True))
         points, is_on_area = shapely.points(places), ~shapely.is_empty(areas)
-        out = is_on_area & ~shapely.intersects(insides, points)
+        out = (is_on_area & ~shapely.intersects(insides, points)).nonzero()[0]
         ways = shapely.get_coordinates(shapely.shortest_line(insides[out], points[out])).reshape(-1, 2, 2)
+        moves = ways[:, 0] - ways[:, 1]
+        at_edge = shapely.intersects(areas[out], points[out])  # on the area: they leave and enter it at their own pace
+        left = np.column_stack((-np.sin(headings), np.cos(headings)))[out[at_edge]]
+        moves[at_edge] = (moves[at_edge] * left).sum(axis=1)[:, None] * left
         wanted = np.zeros_like(places)
-        wanted[out] = ways[:, 0] - ways[:, 1]
-        along = shapely.intersects(areas, points)  # who is on the area leaves it, or comes onto it, at its own pace
-        left = np.column_stack((-np.sin(headings), np.cos(headings)))[along]
-        wanted[along] = (wanted[along] * left).sum(axis=1)[:, None] * left
+        wanted[out] = moves
         shifts = [self._shift(time, *one) for one in zip(people, wanted.tolist(), strict=True)]
         for person, shift, stays in zip(people, shifts, is_on_area.tolist(), strict=True):
             self._shifts[person] = (time, shift)

@@ -73,7 +73,7 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
 
 
 def cruise_speeds(limits: Floats, config: PlanningConfig) -> Floats:
-    """The speeds (n,) to drive at under speed `limits` (n,) [m/s]."""
+    """The speeds to drive at under speed `limits` of any shape [m/s]."""
     return np.maximum(config.cruise_fraction * limits, limits - config.cruise_room)
 
 
