@@ -45,7 +45,7 @@ class Places:
 
     def __init__(self, route: Route, roadmap: RoadMap) -> None:
         self.route = route
-        self._roadmap = roadmap
+        self.roadmap = roadmap
         self._last: Place | None = None
         self._stations = route.line.stations.tolist()
         self._neighbours: tuple[ObjectsTruth, Neighbours] | None = None
@@ -85,7 +85,7 @@ class Places:
 
     def line(self, lane: str) -> Polyline | None:
         """The middle of a lane; None of what the map does not have."""
-        known = self._roadmap.lanes.get(lane)
+        known = self.roadmap.lanes.get(lane)
         return None if known is None else known.line
 
     def lane(self, moment: Moment) -> str | None:
@@ -94,7 +94,7 @@ class Places:
         row = place.row
         if place.is_on_route and self.route.lane_right[row] <= place.offset <= self.route.lane_left[row]:
             return self.route.lane_ids[row]
-        nearest = self._roadmap.lanes_near(place.box[None, :2], 3.0)[0]
+        nearest = self.roadmap.lanes_near(place.box[None, :2], 3.0)[0]
         return nearest[0] if nearest else None
 
     def _place(self, moment: Moment) -> Place:

@@ -10,7 +10,7 @@ from functools import partial
 
 from dvca_sumo.engine.replay import roadmap
 from dvca_sumo.oracles.destination import Destination
-from dvca_sumo.roadmap import RoadMap, RouteError
+from dvca_sumo.roadmap import RouteError
 from dvca_sumo.run import Departing, opened
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.screen.driving import Driven, Heard
@@ -44,9 +44,8 @@ def anchored(scenario: Scenario, trips: Sequence[Trip], hear: Heard) -> Driven:
                 if name in awaited:
                     awaited.remove(name)
                     entry = departing.entry(name, world)
-                    roads = roadmap(scenario.configuration.net, entry.vehicle_class)
                     try:
-                        rides.append(_Ride(world, departing, entry, roads))
+                        rides.append(_Ride(world, departing, entry))
                     except RouteError as error:  # not with the draw's: its departure is the same
                         results.append(TripResult(name, TripOutcome.NOT_DRIVEN, str(error)))
             for ride in list(rides):
@@ -67,12 +66,12 @@ def _is_late(world: World, scenario: Scenario) -> bool:
 class _Ride:
     """One trip with SUMO's own driver."""
 
-    def __init__(self, world: World, departing: Departing, entry: Entry, roads: RoadMap) -> None:
+    def __init__(self, world: World, departing: Departing, entry: Entry) -> None:
         route = departing.route(entry)
         judging = departing.judging(entry, route)
         self.native: Native = world.watch(entry, route)
         self._oracles = [oracle for oracle in judging.oracles if oracle.kind != Destination.kind]
-        self._watch = Watch(entry.ego, judging, roads)
+        self._watch = Watch(entry.ego, judging)
         self._latest = entry.time + _PATIENCE
         self._is_judged = True
 

@@ -4,8 +4,9 @@ The rule: a body appears within sight without having come there (it was inserted
 moves farther in one step than its speed allows (a jump; SUMO's lane changes are such jumps, and so are its turns on the
 spot), and what is violated with it is so before anybody reacts; or at that moment it touches the ego, or is so close in
 the ego's way that full braking after a reaction would not keep the ego off it; a person who appears need only be within
-a step of the ego. Or a person walks into an ego that has stood for a second: SUMO's people walk through vehicles. Then,
-for a while after, violations with that body are the simulator's doing.
+a step of the ego. Or a person walks into an ego that has stood for a second, or into the flank of one after standing
+beside it, its front past: SUMO's people walk through vehicles. Then, for a while after, violations with that body are
+the simulator's doing.
 """
 
 import math
@@ -26,6 +27,7 @@ BRAKING = 8.0  # [m/s^2]
 TOUCHING = 0.2  # [m]
 STEP = 0.75  # [m] people get so far before anybody reacts
 STOOD = 1.0  # [s]
+BESIDE = 3.0  # [m]
 LASTING = 5.0  # [s]
 _STANDING = 0.1  # [m/s]
 _PERSON = int(ObjectClass.PEDESTRIAN)
@@ -36,7 +38,7 @@ class Disturbance(msgspec.Struct, frozen=True):
 
     time: float  # [s]
     object: str
-    how: str  # "appeared", "jumped", or "walked into the standing ego"
+    how: str  # "appeared", "jumped", or "walked into" the standing ego, or its flank
 
     def lasts(self, time: float) -> bool:
         """Whether what that body does at `time` [s] may still come from it."""
@@ -54,6 +56,7 @@ class Disturbances:
         self._rows: dict[str, int] = {}  # by name, in the moment before
         self._sudden: dict[str, Disturbance] = {}  # by name, the last time it appeared or jumped, however far away
         self._drove = -math.inf  # [s] when the ego last moved
+        self._waited: dict[str, float] = {}  # [s] by person, when they last stood beside the ego
 
     def see(self, moment: Moment) -> None:
         """Take in the next moment. To an ego that has just departed, every body has just appeared."""
@@ -76,9 +79,7 @@ class Disturbances:
                 self.found.append(Disturbance(moment.time, names[row], how))
         if abs(moment.ego.speed) >= _STANDING:
             self._drove = moment.time
-        elif moment.time - self._drove >= STOOD:
-            for row in self._walking_in(moment):
-                self.found.append(Disturbance(moment.time, names[row], "walked into the standing ego"))
+        self._see_people(moment)
         self._before, self._rows = objects, rows
 
     def explain(self, name: str | None, time: float) -> Disturbance | None:
@@ -114,14 +115,22 @@ class Disturbances:
         in_way = found.rows[found.gaps < _way_to_stop(ego.speed, found.speeds)]
         return sorted({*touching, *beside, *in_way.tolist()})
 
-    def _walking_in(self, moment: Moment) -> list[int]:
-        people = np.flatnonzero(moment.objects.classes == _PERSON)
-        if people.size == 0:
-            return []
-        touching: list[int] = people[
-            distances(self._places.at(moment).box, moment.objects.boxes[people]) <= 0.0
-        ].tolist()
-        return touching
+    def _see_people(self, moment: Moment) -> None:
+        """Who walks into the ego while it stands, or, having stood beside it with its front past, into its flank."""
+        ego, objects, rows = moment.ego, moment.objects, self._places.within(moment, BESIDE)
+        rows = rows[objects.classes[rows] == _PERSON]
+        if not rows.size:
+            return
+        touches = distances(self._places.at(moment).box, objects.boxes[rows]) <= 0.0
+        along = (objects.boxes[rows, :2] - (ego.x, ego.y)) @ np.array([math.cos(ego.heading), math.sin(ego.heading)])
+        is_beside = (along > -moment.shape.rear_overhang) & (along < moment.shape.front)
+        stands = np.hypot(objects.velocities[rows, 0], objects.velocities[rows, 1]) < _STANDING
+        for row in rows[touches].tolist() if moment.time - self._drove >= STOOD else ():
+            self.found.append(Disturbance(moment.time, objects.ids[row], "walked into the standing ego"))
+        for name in (objects.ids[row] for row in rows[touches & is_beside & ~stands].tolist()):
+            if moment.time - self._waited.get(name, -math.inf) <= LASTING:
+                self.found.append(Disturbance(moment.time, name, "walked into the ego's flank"))
+        self._waited.update((objects.ids[row], moment.time) for row in rows[is_beside & stands].tolist())
 
 
 def _way_to_stop(speed: float, others: Floats) -> Floats:

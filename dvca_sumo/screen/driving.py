@@ -99,8 +99,7 @@ class _Fleet:
                 self._results.append(TripResult(name, TripOutcome.NOT_DRIVEN, str(error)))
                 continue
             self._simulation.drives.append(drive)
-            net, vehicle_class = self._scenario.configuration.net, entry.vehicle_class
-            self._watches[name] = Watch(name, drive.judging, roadmap(net, vehicle_class))
+            self._watches[name] = Watch(name, drive.judging)
 
     def _give_up(self) -> None:
         """On those that will not depart any more."""

@@ -12,7 +12,6 @@ import numpy as np
 from dvca_sumo.messages import ObjectClass
 from dvca_sumo.oracles import Places
 from dvca_sumo.oracles.ahead import ahead
-from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.truth import Moment
 
 REACH = 50.0  # [m] ahead
@@ -24,10 +23,9 @@ _PERIOD = 1.0  # [s] between two looks
 class Jams:
     """Who stands around one ego, and since when."""
 
-    def __init__(self, places: Places, roadmap: RoadMap) -> None:
+    def __init__(self, places: Places) -> None:
         """The watch over one drive, `places` being its oracles'."""
         self._places = places
-        self._roadmap = roadmap
         self._since: dict[str, float] = {}  # [s] by name
         self._looked = -math.inf  # [s]
 
@@ -46,7 +44,7 @@ class Jams:
         """Those who hold up the ego at `moment`, if they make no stops of their own."""
         place, route = self._places.at(moment), self._places.route
         under = {route.lane_ids[row] for row in (place.row, *place.corner_rows)}
-        if moment.ego.speed >= _STANDING or any(self._roadmap.lanes[lane].is_internal for lane in under):
+        if moment.ego.speed >= _STANDING or any(self._places.roadmap.lanes[lane].is_internal for lane in under):
             return []
         names = [moment.objects.ids[row] for row in ahead(self._places, moment, REACH).rows.tolist()]
         return [name for name in names if moment.time - self._since.get(name, moment.time) >= LONG]

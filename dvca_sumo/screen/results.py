@@ -4,7 +4,6 @@ import enum
 
 import msgspec
 
-from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.run import Judging
 from dvca_sumo.screen.disturbances import Disturbances
 from dvca_sumo.screen.jams import Jams
@@ -43,12 +42,12 @@ class TripResult(msgspec.Struct, frozen=True):
 class Watch:
     """Measures and disturbances of one drive; `result` sums them up."""
 
-    def __init__(self, ego: str, judging: Judging, roadmap: RoadMap) -> None:
+    def __init__(self, ego: str, judging: Judging) -> None:
         self._ego = ego
-        self._roadmap = roadmap
+        self._roadmap = judging.places.roadmap
         self._measures = Measures(judging.places, judging.thresholds)
         self._disturbances = Disturbances(judging.places)
-        self._jams = Jams(judging.places, roadmap)
+        self._jams = Jams(judging.places)
         self._contact: Moment | None = None
 
     def see(self, moment: Moment) -> None:

@@ -232,6 +232,25 @@ def test_a_touched_flank_is_the_others_in_the_egos_lane_and_not_on_a_junction(
     assert at_contact(moments[: touching + 1], roads)[-1] == ("collision", fault)
 
 
+@pytest.mark.parametrize(
+    ("waits", "front", "fault"),
+    [(True, 202.0, Fault.SIMULATOR), (False, 202.0, Fault.DRIVER), (True, 199.0, Fault.DRIVER)],
+)
+def test_who_stood_beside_the_ego_and_walks_into_its_flank_is_the_simulators_doing(
+    roads: RoadMap, *, waits: bool, front: float, fault: Fault
+) -> None:
+    """On a junction. Who has walked on all the time, or set off before the front was past, is not."""
+
+    def walked(k: int) -> Moment:
+        ahead = max(k, 0) if waits else k
+        y = LANE_Y - 2.1 + 0.12 * ahead
+        return on_foot(moment(0.1 * k, front + 0.2 * k, 2.0, [("p", (200.0, y), 1.2 * (k > 0 or not waits))]))
+
+    moments = [walked(k) for k in range(-10, 10)]
+    touching = next(k for k, one in enumerate(moments) if one.objects.boxes[0, 1] + 0.25 >= LANE_Y - 0.9)
+    assert at_contact(moments[: touching + 1], roads) == [("collision", fault)]
+
+
 def test_traffic_rules_are_always_the_drivers(roads: RoadMap) -> None:
     where = places(roads)
     oracle, watch = SpeedLimit(where, Thresholds()), Disturbances(where)
