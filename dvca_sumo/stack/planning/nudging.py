@@ -72,8 +72,7 @@ class NudgeDecider:
         self._driven.update(track for track, since in self._moving.items() if situation.time - since > _DRIVING)
         nudges = []
         for blocker in blockers(scene, situation.window, situation.speed, self._held, self._shape, self._config):
-            offset = self._offset(blocker, situation)
-            plateau = None if offset is None else self._plateau(blocker, offset, situation)
+            plateau = self._plateau(blocker, situation)
             if plateau is not None:
                 nudges.append(Nudge(blocker.track, plateau))
         self._held = {
@@ -83,29 +82,34 @@ class NudgeDecider:
         }
         return nudges
 
-    def _plateau(self, blocker: Blocker, offset: float, situation: Situation) -> Plateau | None:
-        """Where the offset has to be reached and left; None where who walks is met before it can be.
+    def _plateau(self, blocker: Blocker, situation: Situation) -> Plateau | None:
+        """Where and how far to move aside; None where there is no way round, or where none is needed.
 
-        A move once begun later than that ends where it did before.
+        Where nothing can be reached before the object is passed it is what is reached soonest, if that is needed at
+        all; not for who walks.
         """
+        late = []
+        for offset in self._choices(blocker, situation):
+            if self._meets_another(blocker, offset, situation.scene):
+                continue
+            if not offset:
+                return None
+            plateau = self._reached(blocker, offset, situation)
+            if plateau.begin <= blocker.high or offset == self._held_offset(blocker.track):
+                return plateau
+            late.append(plateau)
+        return None if blocker.walks or self._clears(blocker, 0.0) else min(late, default=None)
+
+    def _reached(self, blocker: Blocker, offset: float, situation: Situation) -> Plateau:
+        """Where the offset has to be reached and left. A move once begun later than that ends where it did before."""
         begin = blocker.low - self._shape.front - LENGTHWISE
         end = blocker.high + self._shape.rear_overhang + LENGTHWISE
         end += blocker.speed * end / max(situation.speed - blocker.speed, SLOWEST)
-        held = self._held.get(blocker.track)
-        if held is not None and held.offset == offset:
-            begin = max(begin, held.begin - situation.window.station)
+        if offset == self._held_offset(blocker.track):
+            begin = max(begin, self._held[blocker.track].begin - situation.window.station)
         else:
             begin = max(begin, feasible_length(situation.lateral, offset, begin, situation.speed, self._config))
-            if blocker.walks and begin > blocker.high:
-                return None
         return Plateau(begin, max(end, begin), offset)
-
-    def _offset(self, blocker: Blocker, situation: Situation) -> float | None:
-        """The offset to pass at; None where there is no way round, or where none is needed."""
-        for offset in self._choices(blocker, situation):
-            if not self._meets_another(blocker, offset, situation.scene):
-                return offset or None
-        return None
 
     def _choices(self, blocker: Blocker, situation: Situation) -> Iterator[float]:
         """Offsets to pass at, best first: on the side of the last cycle if that still works, else the smaller one.
@@ -115,7 +119,7 @@ class NudgeDecider:
         """
         hold = self._config.nudge_hold
         room = room_beside(blocker, situation.window, situation.speed, self._shape, self._config)
-        held = self._held[blocker.track].offset if blocker.track in self._held else 0.0
+        held = self._held_offset(blocker.track)
         begun = 0.0 if room.is_in_lane(held, hold) else held
         turns_in = self._turns_in(blocker, situation)
         wanted = sorted(room.wanted, key=lambda offset: (offset * held <= 0.0, abs(offset)))
@@ -134,6 +138,10 @@ class NudgeDecider:
                 tight = tightened(blocker, offset, self._config)
                 if self._may_leave_lane(blocker, tight, begun, situation):
                     yield tight
+
+    def _held_offset(self, track: int) -> float:
+        """The offset of the last cycle; 0 without one."""
+        return self._held[track].offset if track in self._held else 0.0
 
     def _clears(self, blocker: Blocker, offset: float) -> bool:
         return blocker.clearance(offset) >= self._config.nudge_clearance_least

@@ -42,8 +42,8 @@ def room_beside(blocker: Blocker, window: Window, speed: float, shape: VehicleSh
 
 
 def tightened(blocker: Blocker, offset: float, config: PlanningConfig) -> float:
-    """The offset on the same side that leaves the least clearance [m]."""
-    return offset - math.copysign(blocker.clearance(offset) - config.nudge_clearance_least, offset)
+    """The offset on the same side that leaves the least clearance [m]; 0 where that needs none."""
+    return math.copysign(max(abs(offset) - blocker.clearance(offset) + config.nudge_clearance_least, 0.0), offset)
 
 
 def _wanted(blocker: Blocker, window: Window, span: slice, shape: VehicleShape, config: PlanningConfig) -> list[float]:

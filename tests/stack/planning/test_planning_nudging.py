@@ -69,6 +69,17 @@ def test_ego_that_has_stopped_behind_a_car_can_still_pull_out() -> None:
     assert_drivable(driven)
 
 
+@pytest.mark.parametrize(("gap", "x", "most"), [(0.2, 9.8, 0.25), (0.5, 9.0, 0.0)])
+def test_who_stands_before_the_nose_is_passed_at_what_can_be_reached_by_then(gap: float, x: float, most: float) -> None:
+    """Not at all the clearance wanted, which would be reached only when they are behind the ego."""
+    beside = -0.5 * SHAPE.width - 0.3 - gap
+    driven = drive(road(lanes_left=1), 30.0, actors=[person(5, x, beside)])
+    assert driven.fronts[-1] > 60.0
+    assert driven.clearances.min() > 0.39
+    assert offsets(driven)[0] > -0.01
+    assert offsets(driven)[1] < most + 0.01
+
+
 def test_neighbouring_lane_is_not_used_while_somebody_is_on_it() -> None:
     overtaking = [car(k, 110.0 - 25.0 * k, 3.2, speed=9.0) for k in range(1, 9)]
     driven = drive(road(lanes_left=1), 45.0, speed=9.0, actors=[cone(50, 110.0), *overtaking])
