@@ -14,6 +14,7 @@ Floats = npt.NDArray[np.float64]
 
 _STILL = 1e-12  # [m/s]
 _SIGNS = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+_NEXT = np.array([1, 2, 3, 0])  # corner after each
 
 
 class Body(Protocol):
@@ -50,16 +51,17 @@ def corners(boxes: Floats) -> Floats:
     half = boxes[:, None, 3:5] * (0.5 * _SIGNS)
     cos, sin = np.cos(boxes[:, 2, None]), np.sin(boxes[:, 2, None])
     along, across = half[..., 0], half[..., 1]
-    return np.stack(
-        [boxes[:, 0, None] + along * cos - across * sin, boxes[:, 1, None] + along * sin + across * cos], axis=-1
-    )
+    found = np.empty((len(boxes), 4, 2))
+    found[..., 0] = boxes[:, 0, None] + along * cos - across * sin
+    found[..., 1] = boxes[:, 1, None] + along * sin + across * cos
+    return found
 
 
 def outlines(boxes: Floats, parts: int) -> Floats:
     """Points all around each box, so many a side and the corners among them: (n, 5) -> (n, 4 parts, 2)."""
     ends = corners(boxes)[:, :, None]
-    shares = np.linspace(0.0, 1.0, parts, endpoint=False)[:, None]
-    return (ends + shares * (np.roll(ends, -1, axis=1) - ends)).reshape(len(boxes), -1, 2)
+    shares = (np.arange(parts) * (1.0 / parts))[:, None]
+    return (ends + shares * (ends.take(_NEXT, axis=1) - ends)).reshape(len(boxes), -1, 2)
 
 
 def radii(boxes: Floats) -> Floats:
@@ -76,7 +78,7 @@ class Neighbours(NamedTuple):
     def within(self, reach: float | Floats) -> npt.NDArray[np.int64]:
         """Rows, ascending, that may be closer than `reach` [m], one for all or (n,); all others certainly are not."""
         limit = self.touching + reach
-        return np.flatnonzero(self.squares <= limit * limit)
+        return (self.squares <= limit * limit).nonzero()[0]
 
 
 def neighbours(box: Floats, boxes: Floats) -> Neighbours:
