@@ -156,7 +156,7 @@ class Digest:
 
 def _bytes_of(value: object) -> object:
     if isinstance(value, np.ndarray):
-        return np.ascontiguousarray(value).tobytes()
+        return value.tobytes()
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"a record holds a {type(value).__name__}, which has no canonical bytes")
