@@ -139,7 +139,9 @@ def test_a_pickled_line_is_the_same() -> None:
 def test_one_point_is_found_as_many_are() -> None:
     line = winding()
     points = line.points[3:] + np.random.default_rng(1).normal(0.0, 2.0, (len(line) - 3, 2))
-    for point, station in zip(points, line.stations[3:], strict=True):
-        between = (float(station) - 20.0, float(station) + 30.0)
-        found, _ = line.project(point, between=between)
-        assert line.station(*point.tolist(), between=between) == found[0]
+    for point, near in zip(points, line.stations[3:].tolist(), strict=True):
+        between = (near - 20.0, near + 30.0)
+        (station,), (offset,) = line.project(point, between=between)
+        place = line.place(*point.tolist(), between=between)
+        assert place[0] == station
+        assert place[1] == pytest.approx(offset)

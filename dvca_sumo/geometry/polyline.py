@@ -68,13 +68,17 @@ class Polyline:
         """
         along = np.asarray(stations, dtype=np.float64)
         segments = self.stations[1:-1].searchsorted(along, side="right")
-        headings = np.interp(along, self._turn_stations, self._turn_headings)
+        headings = self.headings_at(along)
         centres = self.points[segments] + (along - self.stations[segments])[:, None] * self._units[segments]
         poses = np.empty((len(along), 3))
         poses[:, 0] = centres[:, 0] - offsets * np.sin(headings)
         poses[:, 1] = centres[:, 1] + offsets * np.cos(headings)
         poses[:, 2] = headings
         return poses
+
+    def headings_at(self, stations: Floats) -> Floats:
+        """The headings of `poses` alone (m,) [rad]."""
+        return np.interp(stations, self._turn_stations, self._turn_headings)
 
     def project(self, points: npt.ArrayLike, *, between: tuple[float, float] | None = None) -> tuple[Floats, Floats]:
         """Stations and offsets (m,), (m,) of `points` (m, 2): the inverse of `poses`.
@@ -93,25 +97,24 @@ class Polyline:
         stations = self.stations[segments + first] + nearest[np.arange(len(xy)), segments]
         return self._refined(xy, stations, low, high)
 
-    def station(self, x: float, y: float, *, between: tuple[float, float]) -> float:
-        """The station of one point, as `project` finds it."""
+    def place(self, x: float, y: float, *, between: tuple[float, float]) -> tuple[float, float]:
+        """Station and offset of one point, as `project` finds them."""
         low, high = self._window(*between)
         _, origin_x, origin_y, _, _ = self._rows[0]
         first, nearest, squares = self._nearest(np.array([[x - origin_x, y - origin_y, 1.0]]), low, high)
         segment = int(squares.argmin())
         station = self._station_list[first + segment] + nearest.item(segment)
-        segment = bisect_right(self._station_list, station, 1, len(self) - 1) - 1  # at a vertex, the one after it
-        from_station, from_x, from_y, unit_x, unit_y = self._rows[segment]
         knots = self._turn_list
         knot = bisect_right(knots, station, 1, len(knots) - 1) - 1
         turning = self._turn_rates.item(knot)
         heading = self._turn_headings.item(knot) + turning * (station - knots[knot])
         cosine, sine = math.cos(heading), math.sin(heading)
-        dx = x - from_x - (station - from_station) * unit_x
-        dy = y - from_y - (station - from_station) * unit_y
-        fold = turning * (dy * cosine - dx * sine)
+        dx, dy = self._gap(x, y, station)
+        across = dy * cosine - dx * sine
+        fold = turning * across
         step = (dx * cosine + dy * sine) / (1.0 - fold) if abs(fold) < _FOLD else 0.0
-        return min(max(station + step, low), high)
+        refined = min(max(station + step, low), high)
+        return refined, math.copysign(math.hypot(*self._gap(x, y, refined)), across)
 
     def _nearest(self, local: Floats, low: float, high: float) -> tuple[int, Floats, Floats]:
         """First segment searched, and of each one from there the nearest place along it and its squared distance.
@@ -152,6 +155,13 @@ class Polyline:
         segments = self.stations[1:-1].searchsorted(stations, side="right")
         gaps = xy - self.points[segments] - (stations - self.stations[segments])[:, None] * self._units[segments]
         return gaps[:, 0], gaps[:, 1]
+
+    def _gap(self, x: float, y: float, station: float) -> tuple[float, float]:
+        """`_gaps` of one point."""
+        segment = bisect_right(self._station_list, station, 1, len(self) - 1) - 1  # at a vertex, the one after it
+        from_station, from_x, from_y, unit_x, unit_y = self._rows[segment]
+        passed = station - from_station
+        return x - from_x - passed * unit_x, y - from_y - passed * unit_y
 
     def _window(self, low: float, high: float) -> tuple[float, float]:
         low = min(max(low, 0.0), self.length)

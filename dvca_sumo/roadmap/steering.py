@@ -142,7 +142,7 @@ def _drawn(window: _Window, length: float) -> Floats:
     count = max(round(window.line.length / length), 4)
     step = window.line.length / count
     ends = window.line.poses([0.0, window.line.length])
-    turns = np.diff(window.line.poses(np.linspace(0.0, window.line.length, count + 1))[:, 2])
+    turns = np.diff(window.line.headings_at(np.linspace(0.0, window.line.length, count + 1)))
     unknowns = np.append(_spread(turns, _STEERED * step), step)
     terms = _terms(unknowns, window, ends)
     damping = 1.0
@@ -273,7 +273,7 @@ def _offset_slopes(chain: _Chain, window: _Window, rows: Integers, spots: Floats
 
     A turn swings all that comes after it about its middle; a longer step moves it away from the start.
     """
-    headings = window.line.poses(stations)[:, 2]
+    headings = window.line.headings_at(stations)
     tangents = np.column_stack((np.cos(headings), np.sin(headings)))
     by_turns = (tangents * spots).sum(axis=1)[:, None] - tangents @ chain.middles.T
     by_turns[rows[:, None] <= np.arange(len(chain.turns))] = 0.0

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.messages import VehicleShape
 from dvca_sumo.roadmap import Route
@@ -52,8 +54,8 @@ class Ego:
             return self.route.lane_ids[self.route.row_at(front)]
         truth, reach = self.vehicle.truth, self.shape.front
         nose = (truth.x + reach * math.cos(truth.heading), truth.y + reach * math.sin(truth.heading))
-        _, offsets = line.project([nose], between=(front - reach, front + reach))
-        return self.route.lane_at(front, float(offsets[0]))
+        _, offset = line.place(*nose, between=(front - reach, front + reach))
+        return self.route.lane_at(front, offset)
 
     def occupied(self) -> float:
         """How much lane it takes up [m]: more than its length where it cuts the corner that the lanes drive out."""
@@ -72,7 +74,7 @@ class Ego:
             return 1 if change.offsets[-1, 0] > change.offsets[0, 0] else -1
         if self.route.passing_lane_at(front) is not None:
             truth = self.vehicle.truth
-            along = float(self.route.line.poses([self.station()])[0, 2])
+            along = float(self.route.line.headings_at(np.array([self.station()]))[0])
             sideways = truth.speed * math.sin(truth.heading - along)
             if abs(sideways) > _SIDEWAYS:
                 return 1 if sideways > 0.0 else -1
@@ -130,7 +132,7 @@ class _Way:
         """Of the rear axle [m]; asked for once a world step at least."""
         if truth.time != self._time:
             window = (self._station - _SEARCHED, self._station + _SEARCHED)
-            self._station = self._line.station(truth.x, truth.y, between=window)
+            self._station, _ = self._line.place(truth.x, truth.y, between=window)
             self._time = truth.time
         return self._station
 

@@ -62,19 +62,20 @@ class Gaps:
         """For each lane of the change, who is on it or partly so; places count from the station `here` [m]."""
         boxes, velocities = objects.boxes, objects.velocities
         stations, offsets = self._line.project(boxes[:, :2], between=(here - _SEEN, here + _SEEN))
-        headings = self._line.poses(stations)[:, 2]
+        headings = self._line.headings_at(stations)
         angles = boxes[:, 2] - headings
-        cosines, sines = np.abs(np.cos(angles)), np.abs(np.sin(angles))
+        directions = np.cos(angles)
+        cosines, sines = np.abs(directions), np.abs(np.sin(angles))
         lengths = 0.5 * (boxes[:, 3] * cosines + boxes[:, 4] * sines)
         widths = 0.5 * (boxes[:, 3] * sines + boxes[:, 4] * cosines)
         speeds = velocities[:, 0] * np.cos(headings) + velocities[:, 1] * np.sin(headings)
         is_there = (objects.classes != _PERSON) & (stations < change.latest_station) & (np.abs(stations - here) < _SEEN)
-        heads_along = (np.cos(angles) > ALONG) & (objects.classes != _STATIC)
+        heads_along = (directions > ALONG) & (objects.classes != _STATIC)
         found = []
         for centre in change.centres(stations):
             aside = np.abs(offsets - centre)
-            rows = np.flatnonzero(is_there & (aside < widths + 0.5 * self._shape.width))
-            rows = rows[np.argsort(-stations[rows], kind="stable")]
+            rows = (is_there & (aside < widths + 0.5 * self._shape.width)).nonzero()[0]
+            rows = rows[(-stations[rows]).argsort(kind="stable")]
             places, halves = stations[rows] - here, lengths[rows]
             is_traffic = heads_along[rows] & (aside[rows] < IN_LANE)
             tracks = objects.ids[rows].tolist()

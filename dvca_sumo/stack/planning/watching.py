@@ -64,7 +64,7 @@ class WatchList:
         for approach in self._approaches if rows.size else ():
             line = approach.line
             stations, offsets = line.project(boxes[rows, :2])
-            along = np.cos(boxes[rows, 2] - line.poses(stations)[:, 2])
+            along = np.cos(boxes[rows, 2] - line.headings_at(stations))
             reach = max(0.5 * approach.width, config.watch_beside)
             at_line = line.length - (stations + 0.5 * boxes[rows, 3]) <= config.watch_before
             found = rows[at_line & (np.abs(offsets) <= reach) & (along >= ALONG)]
