@@ -18,8 +18,8 @@ from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.continuations import Continuations
 
-# Columns of the table.
-_X, _Y, _HEADING, _BEND_SPEED, _LIMIT, _HALF_WIDTH = range(6)
+_X, _Y, _HEADING = range(3)  # columns of poses
+_BEND_SPEED, _LIMIT, _HALF_WIDTH = range(3)  # rows of rules
 
 _TAIL = 300  # [m] beyond a dead end or the net's edge, traffic is taken to go straight on
 _LENGTH_STEP = 40.0  # [m] continuations are kept by length in such steps
@@ -63,7 +63,8 @@ class LanePaths:
         self._continuations = Continuations(roadmap, max_branches)
         self._lateral_acceleration = lateral_acceleration
         self._braking = braking
-        self._rows = np.empty((4096, 6))
+        self._poses = np.empty((4096, 3))
+        self._rules = np.empty((3, 4096))
         self._used = 0
         self._paths: dict[tuple[str, ...], LanePath] = {}
         self._branches: dict[tuple[str, int], tuple[tuple[LanePath, float], ...]] = {}
@@ -83,26 +84,25 @@ class LanePaths:
         """Places `points` (h, 2) on their paths, searched around the stations guessed (h,)."""
         first, last = _extents(paths)
         rows = np.minimum(np.maximum(np.rint(guesses).astype(np.int64)[:, None] + _WINDOW, 0), last[:, None])
-        near = self._rows.take(rows + first[:, None], axis=0)[:, :, :_HEADING]
+        near = self._poses.take(rows + first[:, None], axis=0)[:, :, :_HEADING]
         gaps = points[:, None, :] - near
         nearest = np.einsum("hwc,hwc->hw", gaps, gaps).argmin(axis=1)
         every = np.arange(len(rows))
         gap, row = gaps[every, nearest], rows[every, nearest]
-        found = self._rows[row + first]
-        headings = found[:, _HEADING]
+        headings = self._poses[row + first, _HEADING]
         cosines, sines = np.cos(headings), np.sin(headings)
         along = gap[:, 0] * cosines + gap[:, 1] * sines
         offsets = gap[:, 1] * cosines - gap[:, 0] * sines
         # Rows are 1 m apart: unless the window missed it, the nearest is about half a metre away along the path.
         beyond = np.maximum(np.abs(along) - 1.0, 0.0)
-        return Placements(row + along, offsets, headings, found[:, _HALF_WIDTH], beyond)
+        return Placements(row + along, offsets, headings, self._rules[_HALF_WIDTH].take(row + first), beyond)
 
     def caps(self, paths: Sequence[LanePath], stations: Floats, count: int) -> tuple[Floats, Floats]:
         """Speeds for bends, and speed limits, at `stations` (h,) and each of `count` metres on: (h, count) each."""
         first, last = _extents(paths)
         rows = np.maximum(np.rint(stations).astype(np.int64), 0)[:, None] + np.arange(count)
-        found = self._rows.take(np.minimum(rows, last[:, None]) + first[:, None], axis=0)
-        return found[:, :, _BEND_SPEED], found[:, :, _LIMIT]
+        rows = np.minimum(rows, last[:, None]) + first[:, None]
+        return self._rules[_BEND_SPEED].take(rows), self._rules[_LIMIT].take(rows)
 
     def poses(self, paths: Sequence[LanePath], stations: Floats, offsets: Floats) -> Floats:
         """Poses at `stations` (h, t), moved to the left by `offsets` (h, t): (h, t, 3), headings not wrapped."""
@@ -110,8 +110,8 @@ class LanePaths:
         rows = np.minimum(np.maximum(stations.astype(np.int64), 0), last[:, None] - 1)
         shares = (stations - rows)[:, :, None]
         rows += first[:, None]
-        before = self._rows.take(rows, axis=0)[:, :, : _HEADING + 1]
-        poses: Floats = before + shares * (self._rows.take(rows + 1, axis=0)[:, :, : _HEADING + 1] - before)
+        before = self._poses.take(rows, axis=0)
+        poses: Floats = before + shares * (self._poses.take(rows + 1, axis=0) - before)
         poses[:, :, _X] -= offsets * np.sin(poses[:, :, _HEADING])
         poses[:, :, _Y] += offsets * np.cos(poses[:, :, _HEADING])
         return poses
@@ -140,15 +140,14 @@ class LanePaths:
         stations = np.arange(int(line.length) + 1 + (0 if parts[-1].successors else _TAIL), dtype=np.float64)
         which = np.searchsorted(starts, stations, side="right") - 1
         poses = line.poses(stations)
-        rows = np.column_stack(
+        rules = np.stack(
             [
-                poses,
                 self._bend_speeds(poses[:, _HEADING]),
                 np.array([part.speed_limit for part in parts])[which],
                 np.array([part.width / 2.0 for part in parts])[which],
             ]
         )
-        return LanePath(lanes, tuple(starts.tolist()), self._stored(rows), len(rows))
+        return LanePath(lanes, tuple(starts.tolist()), self._stored(poses, rules), len(poses))
 
     def _bend_speeds(self, headings: Floats) -> Floats:
         """The speed at each row that leaves time to brake for the bends ahead [m/s]."""
@@ -161,11 +160,14 @@ class LanePaths:
         speeds: Floats = np.sqrt(np.minimum.accumulate((squares + braking)[::-1])[::-1] - braking)
         return speeds
 
-    def _stored(self, rows: Floats) -> int:
-        first, self._used = self._used, self._used + len(rows)
-        if self._used > len(self._rows):
-            self._rows = np.concatenate([self._rows[:first], np.empty((2 * self._used - first, 6))])
-        self._rows[first : self._used] = rows
+    def _stored(self, poses: Floats, rules: Floats) -> int:
+        first, self._used = self._used, self._used + len(poses)
+        if self._used > len(self._poses):
+            more = 2 * self._used - first
+            self._poses = np.concatenate([self._poses[:first], np.empty((more, 3))])
+            self._rules = np.concatenate([self._rules[:, :first], np.empty((3, more))], axis=1)
+        self._poses[first : self._used] = poses
+        self._rules[:, first : self._used] = rules
         return first
 
 
