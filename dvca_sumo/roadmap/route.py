@@ -71,7 +71,7 @@ class LaneChange(msgspec.Struct, frozen=True, eq=False):
 
     def centres(self, stations: Floats) -> Floats:
         """(lanes, m) offsets of the lanes' centres at `stations` (m,) [m]; held before and after."""
-        return np.stack([np.interp(stations, self.stations, offsets) for offsets in self.offsets])
+        return np.array([np.interp(stations, self.stations, offsets) for offsets in self.offsets])
 
     def lane(self, station: float, which: int) -> str:
         """One of the lanes, by its place among them, at a station [m]."""

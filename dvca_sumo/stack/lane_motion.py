@@ -57,7 +57,7 @@ class LaneMotion:
         free = np.minimum(np.maximum(free, np.minimum(squares, finals)), np.maximum(squares, finals))
         slowing = squares - 2.0 * config.braking * metres
         pace = np.maximum(config.speeding, speeds / limits[:, 0])[:, None]
-        briskness = np.clip(speeds / bends[:, 0], 1.0, config.brisk)[:, None]
+        briskness = np.minimum(np.maximum(speeds / bends[:, 0], 1.0), config.brisk)[:, None]
         caps = np.minimum(briskness * bends, pace * limits)
         profile = np.maximum(np.sqrt(np.minimum(free, np.maximum(caps * caps, slowing))), _CRAWL)
         times = np.zeros(profile.shape)
