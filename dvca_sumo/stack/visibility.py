@@ -41,6 +41,8 @@ def visible_shares(boxes: Floats, occluder_width: float) -> Floats:
     overlap &= hides
     np.fill_diagonal(overlap, val=True)
     seen, hiding = overlap.nonzero()
+    if len(seen) == count:  # each is alone in its direction
+        return np.ones(count)
     entries = _entries(boxes[hiding], (middles[:, None] + 2.0 * halves[:, None] * _RAY_SHARES)[seen])
     own = entries[seen == hiding]
     nearest = np.minimum.reduceat(entries, seen.searchsorted(np.arange(count)))
