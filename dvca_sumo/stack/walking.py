@@ -58,7 +58,9 @@ class Walking:
             on, grounds = np.array([row for row, _ in kept]), [ground for _, ground in kept]
             enough = speeds[on] * self._config.stepping_off
             directions[on], rooms = self._along_grounds(points[on], directions[on], ways[on], enough, grounds)
-            stays = (rooms < ways[on]) & (np.isin(on, crossings.rows) | (rooms > enough))
+            crosses = np.zeros(len(rows), dtype=np.bool_)
+            crosses[crossings.rows] = True
+            stays = (rooms < ways[on]) & (crosses[on] | (rooms > enough))
             ways[on[stays]] = np.maximum(rooms[stays] - self._config.kerb_room, 0.0)
         lanes = [() if place is None else (place if isinstance(place, str) else place.lane,) for place in places]
         owners = np.concatenate((np.arange(len(rows)), crossings.rows))
