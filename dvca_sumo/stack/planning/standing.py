@@ -20,12 +20,12 @@ class Standing:
     def settled(self, predicted: PredictedObjects, stood: Container[int]) -> PredictedObjects:
         """The same with those people where they are on average who `stood`, as tracks, in the last cycle."""
         objects = predicted.objects
-        people = np.flatnonzero(objects.classes == _PERSON).tolist()
+        people = (objects.classes == _PERSON).nonzero()[0].tolist()
         rows = [row for row in people if objects.ids[row] in stood]
-        tracks: list[int] = objects.ids[rows].tolist()
         if not rows:
             self._places = {}
             return predicted
+        tracks: list[int] = objects.ids[rows].tolist()
         seen = objects.boxes[rows, :2]
         known = np.array([self._places.get(track, place) for track, place in zip(tracks, seen, strict=True)])
         places = known + _NEW * (seen - known)
