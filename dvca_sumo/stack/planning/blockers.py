@@ -66,9 +66,11 @@ def blockers(
     swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
     near = now.gaps(swept_left, swept_right) < wanted + config.nudge_hold * is_held
     near &= scene.is_standing | is_beside | walks
-    met = _met(now.stations, np.where(walks, scene.speeds * now.directions, 0.0), speed, config.acceleration)
     near &= now.stations + now.half_lengths > -shape.rear_overhang - LENGTHWISE
     near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
+    if not near.any():
+        return []
+    met = _met(now.stations, np.where(walks, scene.speeds * now.directions, 0.0), speed, config.acceleration)
     lows = np.minimum(now.stations, met) - now.half_lengths
     highs = met + now.half_lengths
     found = [

@@ -15,12 +15,14 @@ def blocking(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> int |
     """
     window, path, scene = graph.window, graph.path, graph.scene
     now, buffer = scene.now, config.lateral_buffer
+    lows, highs = now.stations - now.half_lengths, now.stations + now.half_lengths
+    stands_ahead = scene.is_standing & (lows > shape.front)
+    if not stands_ahead.any():
+        return None
     rows = window.index(now.stations)
     is_left = now.offsets > 0.5 * (path.left[rows] + path.right[rows])
     inner = now.offsets + np.where(is_left, -1.0, 1.0) * (now.half_widths + buffer)
-    narrows = np.where(is_left, inner < window.road_left[rows], inner > window.road_right[rows])
-    lows, highs = now.stations - now.half_lengths, now.stations + now.half_lengths
-    narrows &= scene.is_standing & (lows > shape.front)
+    narrows = stands_ahead & np.where(is_left, inner < window.road_left[rows], inner > window.road_right[rows])
     left, right = window.road_left.copy(), window.road_right.copy()
     for row in sorted(narrows.nonzero()[0].tolist(), key=lambda row: float(lows[row])):
         span = window.span(float(lows[row]) - config.buffer_before, float(highs[row]) + config.buffer_behind)

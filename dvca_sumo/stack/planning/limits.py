@@ -127,7 +127,7 @@ def nearest_stop(
         gap = -config.object_gap if config.stops_past_objects else config.object_gap
         occupied_from = float(graph.low[obstacle, 0]) - shape.front
         stops.append(Stop(occupied_from - gap, config.object_gap - _GIVE_AT_OBJECT, label))
-    if views:
+    if views and graph.occupied[:, 0].any():
         those = ahead(graph, shape)
         for view in views:
             stops += _before_blocked(view, those, speed, shape, config)
