@@ -3,33 +3,58 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+import numpy.typing as npt
 import shapely
 
 from dvca_sumo.geometry.polyline import Floats
 
 _FARTHEST = 1.5  # [m] beyond the edge of the road beside its lane, up to which a junction's area is an ego's to use
+_PASSABLE = 1.0  # [m] wide is enough for people to pass
 
 Shape = Sequence[tuple[float, float]]
+Strip = tuple[npt.ArrayLike, float]  # centre line (n, 2) and width of a lane [m]
 
 
-def area_of(
-    outline: Shape, walking: Iterable[Shape] = (), lanes: Sequence[tuple[Floats, float]] = ()
-) -> shapely.Geometry:
+def area_of(outline: Shape, walking: Iterable[Shape] = (), lanes: Sequence[Strip] = ()) -> shapely.Geometry:
     """A junction within its `outline`, with its vehicles' `lanes`, without the `walking` areas beside those.
 
-    Lanes are centre lines (n, 2) and widths [m]. A walking area that one of them leads across is road: what people
-    walk on from crossing to crossing in the middle of a junction. Empty where the net draws none of all that.
+    A walking area that one of them leads across is road: what people walk on from crossing to crossing in the middle of
+    a junction. Empty where the net draws none of all that.
     """
+    corners = walking_corners(walking, lanes)
+    return shapely.union_all([polygon(outline).difference(corners), *_strips(lanes)])
+
+
+def walking_corners(walking: Iterable[Shape], lanes: Sequence[Strip]) -> shapely.Geometry:
+    """The `grounds` of a junction's `walking` areas that no centre line of its vehicles' `lanes` crosses, together."""
+    driven = _centres(lanes)
+    return shapely.union_all([ground for ground in grounds(walking, lanes) if not driven.intersects(ground)])
+
+
+def grounds(walking: Iterable[Shape], lanes: Sequence[Strip]) -> list[shapely.Geometry]:
+    """What people walk on of each of a junction's `walking` areas.
+
+    That is what its vehicles' `lanes` leave of an area which one of them leads across, if it is in one piece, and wide
+    enough to pass; else all of it.
+    """
+    driven = _centres(lanes)
+    return [_beside(area, lanes) if driven.intersects(area) else area for area in map(polygon, walking)]
+
+
+def _beside(area: shapely.Geometry, lanes: Sequence[Strip]) -> shapely.Geometry:
+    left = area.difference(shapely.union_all(_strips(lanes)))
+    middle = shapely.buffer(left, -0.5 * _PASSABLE)
+    return area if middle.is_empty or isinstance(left, shapely.MultiPolygon) else left
+
+
+def _centres(lanes: Sequence[Strip]) -> shapely.Geometry:
+    return shapely.MultiLineString([shapely.LineString(line) for line, _ in lanes])
+
+
+def _strips(lanes: Sequence[Strip]) -> npt.NDArray[np.object_]:
     lines = [shapely.LineString(line) for line, _ in lanes]
-    strips = shapely.buffer(lines, [0.5 * width for _, width in lanes], cap_style="flat")
-    corners = walking_corners(walking, [line for line, _ in lanes])
-    return shapely.union_all([polygon(outline).difference(corners), *strips])
-
-
-def walking_corners(walking: Iterable[Shape], lanes: Iterable[Floats]) -> shapely.Geometry:
-    """The `walking` areas of a junction beside its vehicles' `lanes`, the centre lines (n, 2) of which cross none."""
-    driven = shapely.MultiLineString([shapely.LineString(line) for line in lanes])
-    return shapely.union_all([area for area in map(polygon, walking) if not driven.intersects(area)])
+    strips: npt.NDArray[np.object_] = shapely.buffer(lines, [0.5 * width for _, width in lanes], cap_style="flat")
+    return strips
 
 
 def widened(edges: Floats, points: Floats, headings: Floats, area: shapely.Geometry) -> Floats:

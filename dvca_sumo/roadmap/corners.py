@@ -29,8 +29,8 @@ def off_corners(
         junction = net.junctions[movement.junction]
         if not junction.walking:
             continue
-        lanes = [net.lanes[name].line.points for other in junction.movements for name in other.internal]
-        ground = walking_corners(junction.walking.values(), lanes)
+        lanes = [net.lanes[name] for other in junction.movements for name in other.internal]
+        ground = walking_corners(junction.walking.values(), [(lane.line.points, lane.width) for lane in lanes])
         beside = shapely.MultiLineString(_beside(net, movement, junction.movements))
         points, headings, stations = line.points[rows], poses[rows, 2], line.stations[rows]
         swept = np.stack([stations.searchsorted(stations + reach) for reach in (-_SWEPT, _SWEPT)], axis=1).tolist()

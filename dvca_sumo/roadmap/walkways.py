@@ -7,7 +7,7 @@ import numpy as np
 import shapely
 
 from dvca_sumo.geometry.polyline import Floats
-from dvca_sumo.roadmap.areas import polygon
+from dvca_sumo.roadmap.areas import grounds
 from dvca_sumo.roadmap.lanes import Lane
 from dvca_sumo.roadmap.reading import NetContents
 
@@ -40,7 +40,9 @@ class Walkways:
         shapes = {lane.id: _strip(lane) for lane in crossings}
         shapes |= {lane.id: _strip(lane) for lane in net.lanes.values() if lane.is_pavement}
         for junction in net.junctions.values():
-            shapes |= {lane: polygon(shape) for lane, shape in junction.walking.items()}
+            names = [name for movement in junction.movements for name in movement.internal]
+            strips = [(net.lanes[name].line.points, net.lanes[name].width) for name in names]
+            shapes |= dict(zip(junction.walking, grounds(junction.walking.values(), strips), strict=True))
         self._lanes = list(shapes)
         self._tree = shapely.STRtree(list(shapes.values()))
         self._crossings = len(crossings)  # come first

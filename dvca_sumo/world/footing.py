@@ -3,7 +3,8 @@
 At junctions SUMO has people on walking areas stand and walk beside those, on the road, as well: those who wait at a
 crossing, in a row along its whole width, stand where its corner reaches over the kerb, in the middle of the lane of who
 turns there. Its own drivers drive through them; nobody else gets past. Here they stand on the walking area, and come
-back to SUMO's places on their way across. Who walks on a walking area, along its edge, does so with all of its body.
+back to SUMO's places on their way across. Who walks on a walking area, along its edge, does so with all of its body,
+and beside the lanes that lead across the area, where those leave people a way.
 """
 
 import math
@@ -14,7 +15,7 @@ import numpy as np
 import shapely
 
 from dvca_sumo.messages import Floats
-from dvca_sumo.roadmap.areas import Shape, polygon
+from dvca_sumo.roadmap.areas import Shape, Strip, grounds, polygon
 
 _WALKING_AREA = re.compile(r":.*_w\d+")  # how SUMO names them
 _FROM_KERB = 0.25  # [m] the middle of a body, where the area is wide enough
@@ -24,9 +25,9 @@ _FASTEST = 1.0  # [m/s] at which somebody moves away from SUMO's place, and back
 class Footing:
     """How far everybody is from SUMO's place, at one world step after another."""
 
-    def __init__(self, outline_of: Callable[[str], Shape]) -> None:
-        """`outline_of` gives the outline of a lane of a walking area."""
-        self._outline_of = outline_of
+    def __init__(self, area_of: Callable[[str], tuple[Shape, Sequence[Strip]]]) -> None:
+        """`area_of` gives the outline of a walking area, as an edge, and the lanes of vehicles at its junction."""
+        self._area_of = area_of
         self._areas: dict[str, tuple[shapely.Geometry, shapely.Geometry]] = {}
         self._shifts: dict[str, tuple[float, tuple[float, float]]] = {}  # by person: when [s], and how far [m]
 
@@ -68,8 +69,8 @@ class Footing:
     def _area(self, edge: str) -> tuple[shapely.Geometry, shapely.Geometry]:
         """A walking area, and where the middles of bodies are on it; empty for any other edge."""
         if edge not in self._areas:
-            is_area = _WALKING_AREA.fullmatch(edge) is not None
-            area = polygon(self._outline_of(f"{edge}_0") if is_area else ())
-            inside = shapely.buffer(area, -_FROM_KERB)
-            self._areas[edge] = area, area if shapely.is_empty(inside) else inside
+            outline, lanes = self._area_of(edge) if _WALKING_AREA.fullmatch(edge) else ((), ())
+            (ground,) = grounds([outline], lanes)
+            inside = shapely.buffer(ground, -_FROM_KERB)
+            self._areas[edge] = polygon(outline), ground if shapely.is_empty(inside) else inside
         return self._areas[edge]

@@ -20,6 +20,7 @@ import shapely
 import traci.constants as tc
 
 from dvca_sumo.messages import ObjectClass, SignalColour
+from dvca_sumo.roadmap.areas import Shape, Strip
 from dvca_sumo.scenario import Scenario, ScenarioError, input_words
 from dvca_sumo.truth import EgoTruth, ObjectsTruth
 from dvca_sumo.world.crowd import Body, Crowd
@@ -91,7 +92,8 @@ class Session:
             raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {_in_one_line(error)}") from None
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
-        self._footing = Footing(libsumo.lane.getShape)
+        self._footing = Footing(self._walking_area)
+        self._inner: dict[str, list[Strip]] = {}  # lanes of vehicles on junctions
         self._adopted: dict[str, _Adopted] = {}  # by ego
         self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
@@ -321,6 +323,16 @@ class Session:
     def close(self) -> None:
         """End the simulation; the process may start another."""
         libsumo.close()
+
+    def _walking_area(self, edge: str) -> tuple[Shape, list[Strip]]:
+        """The outline of a walking area, and the lanes of vehicles at its junction."""
+        of, junction = libsumo.lane, edge.rpartition("_")[0]
+        if not self._inner:
+            for lane in of.getIDList():
+                at, _, part = lane.rpartition("_")[0].rpartition("_")
+                if part.isdecimal() and "passenger" in (of.getAllowed(lane) or ("passenger",)):
+                    self._inner.setdefault(at, []).append((of.getShape(lane), of.getWidth(lane)))
+        return of.getShape(f"{edge}_0"), self._inner.get(junction, [])
 
     def _middle(self, lane: str) -> tuple[shapely.LineString, float]:
         """A lane's centre line and width [m]."""

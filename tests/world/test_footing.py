@@ -15,13 +15,18 @@ from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.world.footing import Footing
 
 AREA, CROSSING = ":J_w0", ":J_c0"
-SQUARE = {f"{AREA}_0": ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))}
+SQUARE = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))
 WITH_PEOPLE = ("--sidewalks.guess.from-permissions", "--crossings.guess", "--default-junction-type=traffic_light")
 STANDING = '<trip id="ego" from="B1C1" to="B1C1" depart="0" departPos="20" departSpeed="0" departLane="1"/>'
 CROWD = "".join(
     f'<person id="{number}" depart="{number}" departPos="110"><walk edges="A1B1 B1C1" arrivalPos="60"/></person>'
     for number in range(8)
 )
+
+
+def square(*lanes: tuple[float, float]) -> Footing:
+    """A walking area 4 m wide, and lanes that lead north, given by where along it, and how wide they are."""
+    return Footing(lambda _: (SQUARE, [(((x, -5.0), (x, 9.0)), width) for x, width in lanes]))
 
 
 def follow(
@@ -35,7 +40,7 @@ def follow(
 
 
 def test_who_stands_beside_a_walking_area_comes_onto_it_and_back_at_a_walk() -> None:
-    footing = Footing(SQUARE.__getitem__)
+    footing = square()
     there = np.array(follow(footing, 20, AREA, (4.8, 2.0)))
     assert there[0].tolist() == [4.8, 2.0]
     assert there[-1] == pytest.approx([3.75, 2.0])
@@ -48,14 +53,27 @@ def test_who_stands_beside_a_walking_area_comes_onto_it_and_back_at_a_walk() -> 
 
 
 def test_who_is_on_the_area_stays_where_sumo_has_it() -> None:
-    assert follow(Footing(SQUARE.__getitem__), 5, AREA, (3.7, 2.0)) == [[3.7, 2.0]] * 5
+    assert follow(square(), 5, AREA, (3.7, 2.0)) == [[3.7, 2.0]] * 5
 
 
 def test_who_walks_along_its_edge_keeps_the_body_on_it_and_who_walks_off_it_is_not_held_back() -> None:
-    along = follow(Footing(SQUARE.__getitem__), 5, AREA, (3.9, 2.0), heading=0.5 * np.pi)
+    along = follow(square(), 5, AREA, (3.9, 2.0), heading=0.5 * np.pi)
     assert along[-1] == pytest.approx([3.75, 2.0])
     assert np.abs(np.diff(along, axis=0)).max() <= 1.0 * STEP + 1e-9
-    assert follow(Footing(SQUARE.__getitem__), 5, AREA, (3.9, 2.0), heading=0.0) == [[3.9, 2.0]] * 5
+    assert follow(square(), 5, AREA, (3.9, 2.0), heading=0.0) == [[3.9, 2.0]] * 5
+
+
+def test_who_walks_along_a_lane_that_leads_across_the_area_does_so_beside_it() -> None:
+    along = follow(square((0.4, 3.2)), 30, AREA, (1.0, 2.0), heading=0.5 * np.pi)
+    assert along[-1] == pytest.approx([2.25, 2.0])
+    assert np.abs(np.diff(along, axis=0)).max() <= 1.0 * STEP + 1e-9
+    assert follow(square((0.4, 3.2)), 5, AREA, (1.0, 2.0), heading=0.0) == [[1.0, 2.0]] * 5
+
+
+@pytest.mark.parametrize(("x", "width"), [(2.0, 1.0), (0.4, 6.0)])
+def test_where_lanes_leave_people_no_way_they_walk_on_the_road(x: float, width: float) -> None:
+    """One divides the area, the other leaves 0.6 m of it."""
+    assert follow(square((x, width)), 5, AREA, (1.5, 2.0), heading=0.5 * np.pi) == [[1.5, 2.0]] * 5
 
 
 def test_who_waits_at_a_crossing_does_not_stand_in_the_way_of_those_who_turn(
