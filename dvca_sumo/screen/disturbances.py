@@ -4,8 +4,8 @@ The rule: a body appears within sight without having come there (it was inserted
 moves farther in one step than its speed allows (a jump; SUMO's lane changes are such jumps, and so are its turns on the
 spot), and what is violated with it is so before anybody reacts; or at that moment it touches the ego, or is so close in
 the ego's way that full braking after a reaction would not keep the ego off it; a person who appears need only be within
-a step of the ego. Or a person walks into an ego that has stood for a second, or into the flank of one after standing
-beside it, its front past: SUMO's people walk through vehicles. Then, for a while after, violations with that body are
+a step of the ego. Or a person walks into an ego that has stood for a second, or into the flank of one, or close up to
+it, after standing beside it, its front past: SUMO's people walk through vehicles. Then, for a while after, violations with that body are
 the simulator's doing.
 """
 
@@ -121,13 +121,13 @@ class Disturbances:
         rows = rows[objects.classes[rows] == _PERSON]
         if not rows.size:
             return
-        touches = distances(self._places.at(moment).box, objects.boxes[rows]) <= 0.0
+        gaps = distances(self._places.at(moment).box, objects.boxes[rows])
         along = (objects.boxes[rows, :2] - (ego.x, ego.y)) @ np.array([math.cos(ego.heading), math.sin(ego.heading)])
         is_beside = (along > -moment.shape.rear_overhang) & (along < moment.shape.front)
         stands = np.hypot(objects.velocities[rows, 0], objects.velocities[rows, 1]) < _STANDING
-        for row in rows[touches].tolist() if moment.time - self._drove >= STOOD else ():
+        for row in rows[gaps <= 0.0].tolist() if moment.time - self._drove >= STOOD else ():
             self.found.append(Disturbance(moment.time, objects.ids[row], "walked into the standing ego"))
-        for name in (objects.ids[row] for row in rows[touches & is_beside & ~stands].tolist()):
+        for name in (objects.ids[row] for row in rows[(gaps < TOUCHING) & is_beside & ~stands].tolist()):
             if moment.time - self._waited.get(name, -math.inf) <= LASTING:
                 self.found.append(Disturbance(moment.time, name, "walked into the ego's flank"))
         self._waited.update((objects.ids[row], moment.time) for row in rows[is_beside & stands].tolist())

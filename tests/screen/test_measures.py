@@ -240,15 +240,23 @@ def test_who_stood_beside_the_ego_and_walks_into_its_flank_is_the_simulators_doi
     roads: RoadMap, *, waits: bool, front: float, fault: Fault
 ) -> None:
     """On a junction. Who has walked on all the time, or set off before the front was past, is not."""
-
-    def walked(k: int) -> Moment:
-        ahead = max(k, 0) if waits else k
-        y = LANE_Y - 2.1 + 0.12 * ahead
-        return on_foot(moment(0.1 * k, front + 0.2 * k, 2.0, [("p", (200.0, y), 1.2 * (k > 0 or not waits))]))
-
-    moments = [walked(k) for k in range(-10, 10)]
+    moments = [_walked(k, front, waits=waits) for k in range(-10, 10)]
     touching = next(k for k, one in enumerate(moments) if one.objects.boxes[0, 1] + 0.25 >= LANE_Y - 0.9)
     assert at_contact(moments[: touching + 1], roads) == [("collision", fault)]
+
+
+@pytest.mark.parametrize(("waits", "fault"), [(True, Fault.SIMULATOR), (False, Fault.DRIVER)])
+def test_who_walks_close_up_to_the_egos_flank_is_judged_as_who_walks_into_it(
+    roads: RoadMap, *, waits: bool, fault: Fault
+) -> None:
+    moments = [_walked(k, 202.0, waits=waits) for k in range(-10, 8)]
+    assert at_contact(moments, roads) == [("safe_distance", fault)]
+
+
+def _walked(k: int, front: float, *, waits: bool) -> Moment:
+    """The ego passes at 2 m/s; beside it somebody walks towards its way, or sets off to as its front is at `front`."""
+    y = LANE_Y - 2.1 + 0.12 * (max(k, 0) if waits else k)
+    return on_foot(moment(0.1 * k, front + 0.2 * k, 2.0, [("p", (200.0, y), 1.2 * (k > 0 or not waits))]))
 
 
 def test_traffic_rules_are_always_the_drivers(roads: RoadMap) -> None:
