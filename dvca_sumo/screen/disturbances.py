@@ -4,9 +4,9 @@ The rule: a body appears within sight without having come there (it was inserted
 moves farther in one step than its speed allows (a jump; SUMO's lane changes are such jumps, and so are its turns on the
 spot), and what is violated with it is so before anybody reacts; or at that moment it touches the ego, or is so close in
 the ego's way that full braking after a reaction would not keep the ego off it; a person who appears need only be within
-a step of the ego. Or a person walks into an ego that has stood for a second, or into the flank of one, or close up to
-it, after standing beside it, its front past: SUMO's people walk through vehicles. Then, for a while after, violations with that body are
-the simulator's doing.
+a step of the ego. Or a person walks into an ego that has stood for a second, or, after standing beside one, its front
+past, at its flank, and is within a step of it: SUMO's people walk through vehicles. Then, for a while after, violations
+with that body are the simulator's doing.
 """
 
 import math
@@ -28,6 +28,7 @@ TOUCHING = 0.2  # [m]
 STEP = 0.75  # [m] people get so far before anybody reacts
 STOOD = 1.0  # [s]
 BESIDE = 3.0  # [m]
+AT_FLANK = math.radians(45.0)  # at most, from straight towards it
 LASTING = 5.0  # [s]
 _STANDING = 0.1  # [m/s]
 _PERSON = int(ObjectClass.PEDESTRIAN)
@@ -38,7 +39,7 @@ class Disturbance(msgspec.Struct, frozen=True):
 
     time: float  # [s]
     object: str
-    how: str  # "appeared", "jumped", or "walked into" the standing ego, or its flank
+    how: str  # "appeared", "jumped", or "walked" into the standing ego, or at its flank
 
     def lasts(self, time: float) -> bool:
         """Whether what that body does at `time` [s] may still come from it."""
@@ -116,21 +117,25 @@ class Disturbances:
         return sorted({*touching, *beside, *in_way.tolist()})
 
     def _see_people(self, moment: Moment) -> None:
-        """Who walks into the ego while it stands, or, having stood beside it with its front past, into its flank."""
+        """Who walks into the ego while it stands, or, having stood beside it with its front past, at its flank."""
         ego, objects, rows = moment.ego, moment.objects, self._places.within(moment, BESIDE)
         rows = rows[objects.classes[rows] == _PERSON]
         if not rows.size:
             return
         gaps = distances(self._places.at(moment).box, objects.boxes[rows])
-        along = (objects.boxes[rows, :2] - (ego.x, ego.y)) @ np.array([math.cos(ego.heading), math.sin(ego.heading)])
+        cos, sin = math.cos(ego.heading), math.sin(ego.heading)
+        axes, velocities = np.array([[cos, -sin], [sin, cos]]), objects.velocities[rows]
+        along, left = ((objects.boxes[rows, :2] - (ego.x, ego.y)) @ axes).T
         is_beside = (along > -moment.shape.rear_overhang) & (along < moment.shape.front)
-        stands = np.hypot(objects.velocities[rows, 0], objects.velocities[rows, 1]) < _STANDING
+        speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+        towards = -np.sign(left) * (velocities @ axes)[:, 1] > math.cos(AT_FLANK) * speeds
         for row in rows[gaps <= 0.0].tolist() if moment.time - self._drove >= STOOD else ():
             self.found.append(Disturbance(moment.time, objects.ids[row], "walked into the standing ego"))
-        for name in (objects.ids[row] for row in rows[(gaps < TOUCHING) & is_beside & ~stands].tolist()):
+        for name in (objects.ids[row] for row in rows[(gaps < STEP) & is_beside & towards].tolist()):
             if moment.time - self._waited.get(name, -math.inf) <= LASTING:
-                self.found.append(Disturbance(moment.time, name, "walked into the ego's flank"))
-        self._waited.update((objects.ids[row], moment.time) for row in rows[is_beside & stands].tolist())
+                self.found.append(Disturbance(moment.time, name, "walked at the ego's flank"))
+        stands = is_beside & (speeds < _STANDING)
+        self._waited.update((objects.ids[row], moment.time) for row in rows[stands].tolist())
 
 
 def _way_to_stop(speed: float, others: Floats) -> Floats:

@@ -249,14 +249,32 @@ def test_who_stood_beside_the_ego_and_walks_into_its_flank_is_the_simulators_doi
 def test_who_walks_close_up_to_the_egos_flank_is_judged_as_who_walks_into_it(
     roads: RoadMap, *, waits: bool, fault: Fault
 ) -> None:
+    """An ego that stops before it is touched is no worse than one that does not."""
+    where = places(roads)
+    oracles, watch = [Collision(where, Thresholds()), TimeToCollision(where, Thresholds())], Disturbances(where)
     moments = [_walked(k, 202.0, waits=waits) for k in range(-10, 8)]
-    assert at_contact(moments, roads) == [("safe_distance", fault)]
+    for one in moments:
+        for oracle in oracles:
+            oracle.observe(one)
+        watch.see(one)
+    found = judged([oracle.conclude(Ending.CUT) for oracle in oracles], watch, moments[-1], roads)
+    assert {(one.violation.kind, one.fault) for one in found} == {("safe_distance", fault), ("ttc", fault)}
+
+
+def test_who_walks_along_beside_the_ego_has_not_walked_at_its_flank(roads: RoadMap) -> None:
+    people = [
+        on_foot(moment(0.1 * k, 202.0 + 0.1 * k, 1.0, [("p", (200.0 + 0.12 * k, LANE_Y - 1.4), 1.2 * (k > 0))]))
+        for k in range(9)
+    ]
+    assert disturbances(people, roads) == [("p", "appeared")]  # with the ego, which has just departed
 
 
 def _walked(k: int, front: float, *, waits: bool) -> Moment:
     """The ego passes at 2 m/s; beside it somebody walks towards its way, or sets off to as its front is at `front`."""
     y = LANE_Y - 2.1 + 0.12 * (max(k, 0) if waits else k)
-    return on_foot(moment(0.1 * k, front + 0.2 * k, 2.0, [("p", (200.0, y), 1.2 * (k > 0 or not waits))]))
+    one = on_foot(moment(0.1 * k, front + 0.2 * k, 2.0, [("p", (200.0, y), 0.0)]))
+    velocities = np.array([[0.0, 1.2 * (k > 0 or not waits)]])
+    return msgspec.structs.replace(one, objects=msgspec.structs.replace(one.objects, velocities=velocities))
 
 
 def test_traffic_rules_are_always_the_drivers(roads: RoadMap) -> None:
