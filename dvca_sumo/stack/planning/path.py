@@ -112,16 +112,19 @@ def path_along(
     y[: len(fade)] += (start.y - y[0]) * fade
     scale = 1.0 - curvatures * offsets
     tangents = slopes / scale
-    squared_cosines = 1.0 / (1.0 + tangents * tangents)
+    cosines_to_line = 1.0 / np.sqrt(1.0 + tangents * tangents)
+    angles, turns = np.arctan(tangents), np.zeros(count)
+    turns[0] = bends[0] * cosines_to_line[0] * cosines_to_line[0] / scale[0]
+    turns[1:-1] = 0.5 * (angles[2:] - angles[:-2])  # what they are at a row says little of moves as short as rows are
     arcs = np.zeros(count)
     np.hypot(x[1:] - x[:-1], y[1:] - y[:-1]).cumsum(out=arcs[1:])
-    headings = window.headings[ahead] + np.arctan(tangents)
+    headings = window.headings[ahead] + angles
     left, right = swept(x, y, headings, window.rows[:4, ahead], shape)
     return Path(
         x=x,
         y=y,
         headings=headings,
-        curvatures=(curvatures + bends * squared_cosines / scale) * np.sqrt(squared_cosines) / scale,
+        curvatures=(curvatures + turns) * cosines_to_line / scale,
         arcs=arcs,
         left=np.concatenate((np.full(BEHIND, left[0]), left)),
         right=np.concatenate((np.full(BEHIND, right[0]), right)),

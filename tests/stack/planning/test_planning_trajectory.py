@@ -7,7 +7,9 @@ from planned_drives import SHAPE, believed, car, curve_points, predicted, road
 
 from dvca_sumo.messages import TRAJECTORY_TIMES, Trajectory
 from dvca_sumo.stack.planning import Planner, PlanningConfig
+from dvca_sumo.stack.planning.path import Lateral, Plateau, path_along
 from dvca_sumo.stack.planning.reference import BEHIND, Reference
+from dvca_sumo.stack.planning.start import StartState
 
 NOBODY = predicted([], 0.0)
 
@@ -97,6 +99,15 @@ def test_same_input_gives_the_same_trajectories() -> None:
     for one, other in zip(driven(), driven(), strict=True):
         assert one.decision == other.decision
         assert (one.points == other.points).all()
+
+
+def test_path_is_as_curved_as_it_turns_however_short_a_move_aside() -> None:
+    """Control steers by the curvature: of a move that ends within a metre or two, a row says nothing by itself."""
+    window = Reference(road(), SHAPE, PlanningConfig()).window(100.0, 50.0)
+    start = StartState(100.0, 0.0, 0.0, 4.0, 0.0, 0.0)
+    path = path_along(window, start, Lateral(0.0, 0.02, 0.0), [Plateau(1.4, 8.0, 0.06)], SHAPE, PlanningConfig())
+    turned = (path.headings[2:] - path.headings[:-2]) / (path.arcs[2:] - path.arcs[:-2])
+    assert np.abs(path.curvatures[1:-1] - turned).max() < 0.005
 
 
 def test_window_projects_like_the_line_itself() -> None:
