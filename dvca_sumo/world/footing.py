@@ -19,7 +19,8 @@ from dvca_sumo.roadmap.areas import Shape, Strip, grounds, polygon
 
 _WALKING_AREA = re.compile(r":.*_w\d+")  # how SUMO names them
 _FROM_KERB = 0.25  # [m] the middle of a body, where the area is wide enough
-_FASTEST = 1.0  # [m/s] at which somebody moves away from SUMO's place, and back to it
+_AWAY = 1.0  # [m/s] at which somebody moves away from SUMO's place
+_BACK = 0.5  # [m/s] and back to it, on top of walking
 
 
 class Footing:
@@ -62,7 +63,8 @@ class Footing:
 
     def _shift(self, time: float, person: str, wanted: list[float]) -> tuple[float, float]:
         seen, before = self._shifts.get(person, (time, (0.0, 0.0)))
-        way, most = math.dist(before, wanted), _FASTEST * (time - seen)
+        fastest = _AWAY if math.hypot(*wanted) > math.hypot(*before) else _BACK
+        way, most = math.dist(before, wanted), fastest * (time - seen)
         share = most / way if way > most else 1.0
         return before[0] + share * (wanted[0] - before[0]), before[1] + share * (wanted[1] - before[1])
 

@@ -46,9 +46,9 @@ def test_who_stands_beside_a_walking_area_comes_onto_it_and_back_at_a_walk() -> 
     assert there[-1] == pytest.approx([3.75, 2.0])
     assert np.abs(np.diff(there, axis=0)).max() <= 1.0 * STEP + 1e-9
     assert footing.concerns("p", CROSSING)
-    back = np.array(follow(footing, 20, CROSSING, (4.8, 2.0), begin=20))
+    back = np.array(follow(footing, 40, CROSSING, (4.8, 2.0), begin=20))
     assert back[-1].tolist() == [4.8, 2.0]
-    assert np.abs(np.diff(back, axis=0)).max() <= 1.0 * STEP + 1e-9
+    assert np.abs(np.diff(back, axis=0)).max() <= 0.5 * STEP + 1e-9  # on top of walking: nobody leaps off a kerb
     assert not footing.concerns("p", CROSSING)
 
 
