@@ -59,6 +59,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     edge_clearance: float = 0.2  # [m] to the edge of the road
     nudge_hold: float = 0.15  # [m] smaller changes of a target are taken for noise
     standing_speed: float = 0.5  # [m/s] slower than this is standing: above the noise of a tracker
+    lingering_speed: float = 0.3  # [m/s] slower than this is standing of a person who has walked: it may walk on
     moving_speed: float = 1.0  # [m/s] a vehicle that has stood counts as moving from here: the noise is on both sides
     parked_after: float = 3.0  # [s] of standing before the ego leaves its lane for a vehicle or person
     person_patience: float = 4.0  # [s] of standing at a crossing, before the ego leaves its lane for a person

@@ -76,10 +76,12 @@ def scene_in(
     objects = predicted.objects
     speeds = np.hypot(objects.velocities[:, 0], objects.velocities[:, 1])
     ids: list[int] = objects.ids.tolist()
-    slowest = [config.moving_speed if track in stood else config.standing_speed for track in ids]
+    has_stood = np.array([track in stood for track in ids], dtype=np.bool_)
     counts = predicted.probabilities >= config.possible
     foreseen = _foreseen_speeds(predicted, counts)
-    standing = foreseen < np.where(objects.classes == _PERSON, config.standing_speed, slowest)
+    people = np.where(has_stood, config.standing_speed, config.lingering_speed)
+    others = np.where(has_stood, config.moving_speed, config.standing_speed)
+    standing = foreseen < np.where(objects.classes == _PERSON, people, others)
     counts &= ~standing[predicted.owners]
     stays = np.ones(len(standing), dtype=np.bool_)
     stays[predicted.owners[counts]] = False

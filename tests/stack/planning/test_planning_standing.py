@@ -2,9 +2,13 @@
 
 import msgspec
 import numpy as np
-from planned_drives import car, person, predicted
+import pytest
+from planned_drives import SHAPE, car, person, predicted, road
 
 from dvca_sumo.messages import PredictedObjects
+from dvca_sumo.stack.planning import PlanningConfig
+from dvca_sumo.stack.planning.reference import Reference
+from dvca_sumo.stack.planning.scene import scene_in
 from dvca_sumo.stack.planning.standing import Standing
 
 
@@ -31,3 +35,11 @@ def test_who_has_walked_on_is_where_it_is_seen_and_stands_anew_there() -> None:
     elsewhere = predicted([person(3, 25.0, 1.0)], 0.0)
     assert standing.settled(elsewhere, set()) is elsewhere
     assert standing.settled(elsewhere, {3}).objects.boxes[0, 0] == 25.0
+
+
+@pytest.mark.parametrize(("stood", "speed", "stands"), [((), 0.4, False), ((), 0.2, True), ((3,), 0.4, True)])
+def test_who_slows_down_on_foot_may_walk_on(stood: tuple[int, ...], speed: float, *, stands: bool) -> None:
+    """Whoever has stood is not told by the noise of a tracker to walk."""
+    window = Reference(road(), SHAPE, PlanningConfig()).window(100.0, 50.0)
+    scene = scene_in(window, predicted([person(3, 120.0, 2.5, speed=speed)], 0.0), 0.0, stood, PlanningConfig())
+    assert scene.is_standing.tolist() == [stands]
