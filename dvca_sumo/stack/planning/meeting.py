@@ -38,7 +38,9 @@ class Demand(msgspec.Struct, frozen=True):
 class Meetings:
     """Decides about the futures that cross or join the path; remembers whom the ego passes in front of."""
 
-    def __init__(self, shape: VehicleShape, config: PlanningConfig) -> None:
+    def __init__(self, lanes: Iterable[str], shape: VehicleShape, config: PlanningConfig) -> None:
+        """`lanes` are those of the ego's route."""
+        self._lanes = frozenset(lanes)
         self._shape = shape
         self._config = config
         self._passing: frozenset[int] = frozenset()
@@ -121,7 +123,8 @@ class Meetings:
         """Whether the other has priority. People have, but before a crossing where they have to wait.
 
         On junctions the map tells; elsewhere, who leaves its lane has not. That is the ego itself where its line has
-        left the lane, in turns that it cannot drive within, or the other: None, it cuts in.
+        left the lane, in turns that it cannot drive within, or the other: None, it cuts in. Neither has where the map
+        draws two lanes one on the other.
         """
         scene = graph.scene
         near, far = (graph.window.station + float(ends[row, graph.first[row]]) for ends in (graph.low, graph.high))
@@ -130,7 +133,8 @@ class Meetings:
             return told is not False or len(scene.lanes[row]) < _STILL_TO_CROSS
         if told is not None:
             return told
-        return True if self._is_off_lane(row, graph) or not self._cuts_in(row, graph) else None
+        keeps_lane = bool(scene.lanes[row]) and self._lanes.isdisjoint(scene.lanes[row])
+        return True if keeps_lane or self._is_off_lane(row, graph) or not self._cuts_in(row, graph) else None
 
     def _is_off_lane(self, row: int, graph: Graph) -> bool:
         """Whether the line is off its lane here, or where the two ways meet."""

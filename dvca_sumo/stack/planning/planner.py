@@ -55,7 +55,7 @@ class Planner:
         self._nudging = NudgeDecider(shape, config)
         self._settling = Settling(config)
         self._standing = Standing()
-        self._meetings = Meetings(shape, config)
+        self._meetings = Meetings(route.lane_ids, shape, config)
         self._previous: Trajectory | None = None
         self._station: float | None = None  # of the start state of the last cycle
 

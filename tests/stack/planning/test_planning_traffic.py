@@ -578,6 +578,14 @@ def test_where_its_line_comes_back_to_the_lane_the_ego_lets_those_on_the_lane_go
     assert driven.fronts[-1] > 40.0
 
 
+@pytest.mark.parametrize(("behind", "speed"), [(6.0, 9.0), (6.0, 10.0), (8.0, 10.0), (14.0, 10.0)])
+def test_where_the_map_draws_two_lanes_one_on_the_other_nobody_cuts_in(behind: float, speed: float) -> None:
+    """Who keeps to its own lane does not look at the ego's."""
+    other = car(3, 5.0 - behind, 4.0, heading=-0.12, speed=speed, lanes=("beside_0",))
+    driven = drive(road(lanes_left=1), 6.0, speed=6.0, actors=[other])
+    assert driven.clearances.min() > 0.3
+
+
 @pytest.mark.parametrize("station", [106.0, 108.0, 110.0])
 def test_who_stands_right_behind_the_ego_in_a_tight_turn_does_not_hold_it(station: float) -> None:
     route = road(curve_points(5.0))
