@@ -11,6 +11,7 @@ from screen_scenes import LANE_Y, Row, cruise, moment, places
 
 from dvca_sumo.messages import ObjectClass
 from dvca_sumo.oracles.collision import Collision
+from dvca_sumo.oracles.protocol import Oracle
 from dvca_sumo.oracles.speed_limit import SpeedLimit
 from dvca_sumo.oracles.ttc import TimeToCollision
 from dvca_sumo.roadmap import RoadMap
@@ -251,7 +252,8 @@ def test_who_walks_close_up_to_the_egos_flank_is_judged_as_who_walks_into_it(
 ) -> None:
     """An ego that stops before it is touched is no worse than one that does not."""
     where = places(roads)
-    oracles, watch = [Collision(where, Thresholds()), TimeToCollision(where, Thresholds())], Disturbances(where)
+    oracles: list[Oracle] = [Collision(where, Thresholds()), TimeToCollision(where, Thresholds())]
+    watch = Disturbances(where)
     moments = [_walked(k, 202.0, waits=waits) for k in range(-10, 8)]
     for one in moments:
         for oracle in oracles:
