@@ -9,9 +9,9 @@ Rules of this file:
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import libsumo
 import msgspec
@@ -35,9 +35,8 @@ from dvca_sumo.world.signals import Signals
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
 NEVER_TELEPORTED = "dvca.ego"  # vehicle type of an adopted ego
 
-_VEHICLE = (tc.VAR_POSITION, tc.VAR_ANGLE, tc.VAR_SPEED, tc.VAR_LANE_ID)
-# Other variables than for vehicles: results of both kinds arrive in one dictionary, by id.
-_PERSON = (tc.VAR_POSITION3D, tc.VAR_ANGLE, tc.VAR_SPEED, tc.VAR_VEHICLE, tc.VAR_ROAD_ID)
+# What is asked of who is near tells of which kind they are: the answers for both arrive in one dictionary, by id.
+_VEHICLE, _PERSON = tc.VAR_SPEED, tc.VAR_ANGLE
 _NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
 _ANY_BRAKING = 1e4  # [m/s^2] SUMO's own driver, overruled, would warn of braking for the arrival at every step
 _MATCHED_WITHIN = 30.0  # [m] of a lane an ego is on the road; SUMO looks at every lane within that
@@ -59,6 +58,27 @@ class Motion(msgspec.Struct, frozen=True):
     acceleration: float  # [m/s^2]
     is_on_road: bool  # not while it is teleported
     edges: tuple[str, ...]  # of its present route
+
+
+class _Seen(NamedTuple):
+    """One moving body at this step, whoever watches it."""
+
+    name: str  # a key of the bodies
+    motion: tuple[float, float, float, float]  # SUMO's x, y [m], angle [deg], speed [m/s]
+    lane: str  # "" on foot
+    ground: str  # the edge that somebody on foot is on
+
+
+class _Readings(dict[str, tuple[_Seen, ...]]):
+    """What has been seen since the last step, read once however many watch it; empty for who is nowhere."""
+
+    def __init__(self, read: Callable[[str], tuple[_Seen, ...]]) -> None:
+        super().__init__()
+        self._read = read
+
+    def __missing__(self, name: str) -> tuple[_Seen, ...]:
+        read = self[name] = self._read(name)
+        return read
 
 
 class _Adopted(msgspec.Struct):
@@ -92,6 +112,7 @@ class Session:
             raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {_in_one_line(error)}") from None
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
+        self._vehicles, self._people = _Readings(self._vehicle_now), _Readings(self._person_now)
         self._footing = Footing(self._walking_area)
         self._inner: dict[str, list[Strip]] = {}  # lanes of vehicles on junctions
         self._adopted: dict[str, _Adopted] = {}  # by ego
@@ -118,6 +139,8 @@ class Session:
             libsumo.simulationStep()
         except _GIVES_UP as error:
             raise ScenarioError(f"SUMO stopped at {self.time:g} s: {_in_one_line(error)}") from None
+        self._vehicles.clear()
+        self._people.clear()
 
     def departed(self) -> tuple[str, ...]:
         """Vehicles inserted in the last step."""
@@ -215,8 +238,8 @@ class Session:
         """Have `objects` ready for a vehicle: what is within `radius` [m] of it."""
         of = libsumo.vehicle
         self._crowds[vehicle] = Crowd()
-        of.subscribeContext(vehicle, tc.CMD_GET_VEHICLE_VARIABLE, radius, _VEHICLE)
-        of.subscribeContext(vehicle, tc.CMD_GET_PERSON_VARIABLE, radius, _PERSON)
+        of.subscribeContext(vehicle, tc.CMD_GET_VEHICLE_VARIABLE, radius, (_VEHICLE,))
+        of.subscribeContext(vehicle, tc.CMD_GET_PERSON_VARIABLE, radius, (_PERSON,))
 
     def remove(self, vehicle: str) -> None:
         """Take a vehicle out of the simulation."""
@@ -263,34 +286,26 @@ class Session:
 
     def objects(self, ego: str) -> ObjectsTruth:
         """Every moving body near a watched vehicle: vehicles (parked ones too), people on foot."""
-        names: list[str] = []
-        motions: list[float] = []
-        lanes: list[str] = []
-        edges: dict[int, str] = {}  # by row, of people whose places SUMO leaves open
-        for name, values in libsumo.vehicle.getContextSubscriptionResults(ego).items():
-            is_person = tc.VAR_POSITION3D in values
-            if tc.VAR_POSITION in values and name != ego and abs(values[tc.VAR_POSITION][0]) < _NOWHERE:
-                names.append(self._vehicle(name))
-                motions += values[tc.VAR_POSITION]
-                # A person of the same name overwrote the other values.
-                motions += _turn(libsumo.vehicle, name) if is_person else (values[tc.VAR_ANGLE], values[tc.VAR_SPEED])
-                lanes.append(sys.intern(values[tc.VAR_LANE_ID]))  # met again in thousands of moments
-            if is_person and not values[tc.VAR_VEHICLE]:
-                is_mixed = tc.VAR_POSITION in values
-                person, edge = self._person(name), values[tc.VAR_ROAD_ID]
-                if self._footing.concerns(person, edge):
-                    edges[len(names)] = edge
-                names.append(person)
-                motions += values[tc.VAR_POSITION3D][:2]
-                motions += _turn(libsumo.person, name) if is_mixed else (values[tc.VAR_ANGLE], values[tc.VAR_SPEED])
-                lanes.append("")
+        seen: list[_Seen] = []
+        for name, kinds in libsumo.vehicle.getContextSubscriptionResults(ego).items():
+            if _VEHICLE in kinds and name != ego:
+                seen += self._vehicles[name]
+            if _PERSON in kinds:
+                seen += self._people[name]
+        names, motions = [one.name for one in seen], [number for one in seen for number in one.motion]
+        # People whose places SUMO leaves open, by row.
+        edges = {
+            row: one.ground
+            for row, one in enumerate(seen)
+            if one.ground and self._footing.concerns(one.name, one.ground)
+        }
         if edges:
             people, motion = [names[row] for row in edges], np.array([motions[4 * row : 4 * row + 3] for row in edges])
             headings = np.radians(90.0 - motion[:, 2])
             placed = self._footing.placed(self.time, people, list(edges.values()), motion[:, :2], headings).tolist()
             for row, place in zip(edges, placed, strict=True):
                 motions[4 * row : 4 * row + 2] = place
-        return self._crowds[ego].seen(self.time, names, motions, lanes, self._bodies)
+        return self._crowds[ego].seen(self.time, names, motions, [one.lane for one in seen], self._bodies)
 
     def signals(self, signal_ids: tuple[str, ...]) -> dict[str, SignalColour]:
         """Colours of signal heads, given as "traffic light/link index"; not to be written to."""
@@ -352,6 +367,21 @@ class Session:
             of.setRoute(ego, onward)
             itinerary.route = of.getRouteID(ego)
 
+    def _vehicle_now(self, name: str) -> tuple[_Seen, ...]:
+        of = libsumo.vehicle
+        x, y = of.getPosition(name)
+        if abs(x) >= _NOWHERE:
+            return ()
+        lane = sys.intern(of.getLaneID(name))  # met again in thousands of moments
+        return (_Seen(self._vehicle(name), (x, y, of.getAngle(name), of.getSpeed(name)), lane, ""),)
+
+    def _person_now(self, name: str) -> tuple[_Seen, ...]:
+        of = libsumo.person
+        if of.getVehicle(name):
+            return ()
+        x, y = of.getPosition(name)
+        return (_Seen(self._person(name), (x, y, of.getAngle(name), of.getSpeed(name)), "", of.getRoadID(name)),)
+
     def _vehicle(self, name: str) -> str:
         """The key of a vehicle among the bodies."""
         if name not in self._bodies:
@@ -373,10 +403,6 @@ class Session:
 def _is_braking(truth: EgoTruth) -> bool:
     """Whether brake lights are on, as of SUMO's vehicles: slower at once than by rolling."""
     return truth.speed <= _STANDING or truth.acceleration < -(0.05 + 0.005 * truth.speed) * truth.speed
-
-
-def _turn(domain: Any, name: str) -> tuple[float, float]:
-    return domain.getAngle(name), domain.getSpeed(name)
 
 
 def _in_one_line(error: Exception) -> str:
