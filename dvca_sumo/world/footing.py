@@ -18,7 +18,8 @@ from dvca_sumo.messages import Floats
 from dvca_sumo.roadmap.areas import Shape, Strip, grounds, polygon
 
 _WALKING_AREA = re.compile(r":.*_w\d+")  # how SUMO names them
-_FROM_KERB = 0.25  # [m] the middle of a body, where the area is wide enough
+_FROM_KERB = (0.5, 0.25)  # [m] the middle of a body; the first that the area is wide enough for
+_STANDING = 0.1  # [m/s]
 _AWAY = 1.0  # [m/s] at which somebody moves away from SUMO's place
 _BACK = 0.5  # [m/s] and back to it, on top of walking
 
@@ -37,18 +38,20 @@ class Footing:
         return person in self._shifts or _WALKING_AREA.fullmatch(edge) is not None
 
     def placed(
-        self, time: float, people: Sequence[str], edges: Sequence[str], places: Floats, headings: Floats
+        self, time: float, people: Sequence[str], edges: Sequence[str], places: Floats, headings: Floats, speeds: Floats
     ) -> Floats:
         """Where `people` are (n, 2) [m] who are concerned, at `time` [s].
 
-        SUMO's `places` (n, 2) [m] are on the `edges`; it has them walk, or look, along `headings` (n,) [rad].
+        SUMO's `places` (n, 2) [m] are on the `edges`; it has them walk at `speeds` (n,) [m/s], or look, along
+        `headings` (n,) [rad].
         """
         areas, insides = (np.array(parts) for parts in zip(*map(self._area, edges), strict=True))
         points, is_on_area = shapely.points(places), ~shapely.is_empty(areas)
         out = (is_on_area & ~shapely.intersects(insides, points)).nonzero()[0]
         ways = shapely.get_coordinates(shapely.shortest_line(insides[out], points[out])).reshape(-1, 2, 2)
         moves = ways[:, 0] - ways[:, 1]
-        at_edge = shapely.intersects(areas[out], points[out])  # on the area: they leave and enter it at their own pace
+        at_edge = shapely.intersects(areas[out], points[out])  # on the area ...
+        at_edge &= speeds[out] > _STANDING  # ... they leave and enter it at their own pace
         left = np.column_stack((-np.sin(headings), np.cos(headings)))[out[at_edge]]
         moves[at_edge] = (moves[at_edge] * left).sum(axis=1)[:, None] * left
         wanted = np.zeros_like(places)
@@ -73,6 +76,7 @@ class Footing:
         if edge not in self._areas:
             outline, lanes = self._area_of(edge) if _WALKING_AREA.fullmatch(edge) else ((), ())
             (ground,) = grounds([outline], lanes)
-            inside = shapely.buffer(ground, -_FROM_KERB)
-            self._areas[edge] = polygon(outline), ground if shapely.is_empty(inside) else inside
+            insides = (shapely.buffer(ground, -kept) for kept in _FROM_KERB)
+            inside = next((one for one in insides if not shapely.is_empty(one)), ground)
+            self._areas[edge] = polygon(outline), inside
         return self._areas[edge]

@@ -300,10 +300,10 @@ class Session:
             if one.ground and self._footing.concerns(one.name, one.ground)
         }
         if edges:
-            people, motion = [names[row] for row in edges], np.array([motions[4 * row : 4 * row + 3] for row in edges])
-            headings = np.radians(90.0 - motion[:, 2])
-            placed = self._footing.placed(self.time, people, list(edges.values()), motion[:, :2], headings).tolist()
-            for row, place in zip(edges, placed, strict=True):
+            people, motion = [names[row] for row in edges], np.array([motions[4 * row : 4 * row + 4] for row in edges])
+            headings, speeds = np.radians(90.0 - motion[:, 2]), motion[:, 3]
+            placed = self._footing.placed(self.time, people, list(edges.values()), motion[:, :2], headings, speeds)
+            for row, place in zip(edges, placed.tolist(), strict=True):
                 motions[4 * row : 4 * row + 2] = place
         return self._crowds[ego].seen(self.time, names, motions, [one.lane for one in seen], self._bodies)
 

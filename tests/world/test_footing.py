@@ -30,20 +30,24 @@ def square(*lanes: tuple[float, float]) -> Footing:
 
 
 def follow(
-    footing: Footing, steps: int, edge: str, place: tuple[float, float], begin: int = 0, heading: float = 0.0
+    footing: Footing,
+    steps: int,
+    edge: str,
+    place: tuple[float, float],
+    begin: int = 0,
+    heading: float = 0.0,
+    speed: float = 1.0,
 ) -> list[list[float]]:
     """Where somebody is at each of so many steps whom SUMO leaves at one place."""
-    place_and_heading = np.array([place]), np.array([heading])
-    return [
-        footing.placed(STEP * row, ["p"], [edge], *place_and_heading)[0].tolist() for row in range(begin, begin + steps)
-    ]
+    motion = np.array([place]), np.array([heading]), np.array([speed])
+    return [footing.placed(STEP * row, ["p"], [edge], *motion)[0].tolist() for row in range(begin, begin + steps)]
 
 
 def test_who_stands_beside_a_walking_area_comes_onto_it_and_back_at_a_walk() -> None:
     footing = square()
     there = np.array(follow(footing, 20, AREA, (4.8, 2.0)))
     assert there[0].tolist() == [4.8, 2.0]
-    assert there[-1] == pytest.approx([3.75, 2.0])
+    assert there[-1] == pytest.approx([3.5, 2.0])
     assert np.abs(np.diff(there, axis=0)).max() <= 1.0 * STEP + 1e-9
     assert footing.concerns("p", CROSSING)
     back = np.array(follow(footing, 40, CROSSING, (4.8, 2.0), begin=20))
@@ -53,19 +57,31 @@ def test_who_stands_beside_a_walking_area_comes_onto_it_and_back_at_a_walk() -> 
 
 
 def test_who_is_on_the_area_stays_where_sumo_has_it() -> None:
-    assert follow(square(), 5, AREA, (3.7, 2.0)) == [[3.7, 2.0]] * 5
+    assert follow(square(), 5, AREA, (3.4, 2.0), speed=0.0) == [[3.4, 2.0]] * 5
 
 
-def test_who_walks_along_its_edge_keeps_the_body_on_it_and_who_walks_off_it_is_not_held_back() -> None:
+def test_who_waits_at_the_kerb_stands_off_it_and_who_steps_off_it_is_not_held_back() -> None:
+    waits = follow(square(), 10, AREA, (3.9, 2.0), speed=0.0)
+    assert waits[-1] == pytest.approx([3.5, 2.0])
+    assert follow(square(), 5, AREA, (3.9, 2.0), speed=0.5) == [[3.9, 2.0]] * 5
+
+
+def test_on_a_narrow_area_people_stand_nearer_to_the_kerb() -> None:
+    narrow = ((0.0, 0.0), (0.8, 0.0), (0.8, 4.0), (0.0, 4.0))
+    waits = follow(Footing(lambda _: (narrow, [])), 10, AREA, (0.75, 2.0), speed=0.0)
+    assert waits[-1] == pytest.approx([0.55, 2.0])
+
+
+def test_who_walks_along_its_edge_keeps_off_it_and_who_walks_off_it_is_not_held_back() -> None:
     along = follow(square(), 5, AREA, (3.9, 2.0), heading=0.5 * np.pi)
-    assert along[-1] == pytest.approx([3.75, 2.0])
+    assert along[-1] == pytest.approx([3.5, 2.0])
     assert np.abs(np.diff(along, axis=0)).max() <= 1.0 * STEP + 1e-9
     assert follow(square(), 5, AREA, (3.9, 2.0), heading=0.0) == [[3.9, 2.0]] * 5
 
 
 def test_who_walks_along_a_lane_that_leads_across_the_area_does_so_beside_it() -> None:
     along = follow(square((0.4, 3.2)), 30, AREA, (1.0, 2.0), heading=0.5 * np.pi)
-    assert along[-1] == pytest.approx([2.25, 2.0])
+    assert along[-1] == pytest.approx([2.5, 2.0])
     assert np.abs(np.diff(along, axis=0)).max() <= 1.0 * STEP + 1e-9
     assert follow(square((0.4, 3.2)), 5, AREA, (1.0, 2.0), heading=0.0) == [[1.0, 2.0]] * 5
 
@@ -92,4 +108,4 @@ def test_who_waits_at_a_crossing_does_not_stand_in_the_way_of_those_who_turn(
     people = objects.classes == ObjectClass.PEDESTRIAN
     seen = shapely.distance(lines, shapely.points(objects.boxes[people, :2]))
     assert told.min() < 1.1
-    assert seen.min() > 1.25
+    assert seen.min() > 1.6
