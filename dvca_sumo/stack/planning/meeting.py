@@ -77,17 +77,24 @@ class Meetings:
             return None
         stop = self._stop(row, graph, views if others_first else [])
         room = stop.at + stop.give
-        if room <= -HARD_GAP - self._beside(row, graph, profile):  # stopping there would not help
+        if room <= -HARD_GAP - self._beside(row, entry, graph, profile):  # stopping there would not help
             return None
         is_too_late = profile.speeds[0] ** 2 / (2.0 * max(room, _LEAST_ROOM)) > config.hard_braking
         if is_too_late and self._passes([row], graph, profile, 0.0)[0]:
             return None
         return Demand(row, stop, follows=self._joins(row, graph))
 
-    def _beside(self, row: int, graph: Graph, profile: Profile) -> float:
-        """How far behind the front bumper somebody may come to the ego's way, and standing still helps [m]."""
-        is_person = graph.scene.classes[graph.scene.owners[row]] == _PERSON
-        if not is_person or profile.speeds[0] >= _SLOW:
+    def _beside(self, row: int, entry: float, graph: Graph, profile: Profile) -> float:
+        """How far behind the front bumper somebody may come to the ego's way, at `entry` [s], and standing helps [m].
+
+        An ego that hardly moves does not get away from a vehicle any more; standing, it is seen and driven around.
+        """
+        config, scene, speed = self._config, graph.scene, float(profile.speeds[0])
+        if scene.classes[scene.owners[row]] != _PERSON:
+            is_met = entry < config.soon and scene.probabilities[row] >= config.likely
+            is_caught = is_met and speed < config.standing_speed and not self._passes([row], graph, profile, 0.0)[0]
+            return self._shape.length if is_caught else 0.0
+        if speed >= _SLOW:
             return 0.0
         brushes = bool((graph.gaps[row][graph.occupied[row]] < _BRUSHING).any())
         return self._shape.length if brushes else _BESIDE_PERSON

@@ -318,6 +318,17 @@ def test_ego_stops_at_once_for_a_car_that_comes_out_right_before_its_bumper(spee
     assert_drivable(driven)
 
 
+@pytest.mark.parametrize("x", [101.0, 102.5, 104.0])
+@pytest.mark.parametrize("crawls", [0.0, 0.3])
+def test_a_slow_ego_in_the_way_of_a_bus_that_comes_stands(x: float, crawls: float) -> None:
+    """It does not get out of the way any more; moving, it would be the one that drives into the bus."""
+    bus = car(3, x, -10.5, heading=UP, speed=3.0, size=(12.0, 2.5), lanes=("minor_0",))
+    driven = drive(road(), 3.0, station=100.0, speed=crawls, actors=[bus])
+    touched = driven.clearances <= 0.0
+    assert touched.any()
+    assert driven.speeds[touched].max() < 0.1
+
+
 @pytest.mark.parametrize("speed", [5.0, 14.0])
 def test_a_standing_ego_does_not_start_towards_who_comes_past_it_with_hardly_room(speed: float) -> None:
     driven = drive(
