@@ -42,7 +42,8 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     # Distances kept sideways, from the side of the body.
     object_margin: float = 0.3  # [m] closer than this counts as in the way
     bicycle_margin: float = 0.6  # [m] bicycles sway
-    person_margin: float = 0.35  # [m] of people who stand or walk along the road
+    person_margin: float = 0.35  # [m] of people who stand or walk along the road ...
+    creeping_speed: float = 1.5  # [m/s] ... but slower, `object_margin` of those who stand, at walking pace
     person_least: float = 0.25  # [m] of people who stand beside the body: it stays until they go
     crossing_person_margin: float = 1.0  # [m] of people who walk across
     crossing_margin: float = 2.0  # [m] of people who walk across at a pedestrian crossing

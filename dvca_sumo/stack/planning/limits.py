@@ -21,6 +21,8 @@ _PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
 _PRIORITY = Control.PRIORITY
 _SLOW_FOR_PERSON = (3.0, 6.0)  # [m/s], [m/s per m of gap]
 _SLOW_FOR_OBJECT = (4.0, 10.0)  # [m/s], [m/s per m of gap]
+_CREEPING = 1.0  # [m/s] past people who stand very close: below `creeping_speed`, so that they stay out of the way ...
+_ROOM_TO_CREEP = 6.0  # ... and from so far before them [m]: from where the ego stopped for them
 _STEERED = 4  # [m] of path over which changes of curvature are looked at
 _BESIDE = 3.0  # [m] sideways
 _AT_LINE = 4.0  # [m] before or past it
@@ -50,7 +52,7 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
     turning = config.steering_rate * _STEERED / (shape.wheelbase * np.maximum(changes, 1e-4))
     middle = slice(_STEERED // 2, _STEERED // 2 + len(turning))
     caps[middle] = np.minimum(caps[middle], turning)
-    passed = [(row, cap, 0.0) for row, cap in _passing_speeds(graph, config)]
+    passed = _passing_speeds(graph, config)
     passed += [(row, _BEFORE_WAITING, _ROOM_TO_STOP) for row in _waiting(graph, views)]
     for row, cap, room in passed:
         low, high = graph.low[row, 0] - shape.front - room, graph.high[row, 0] + shape.rear_overhang
@@ -179,8 +181,8 @@ def _is_behind(graph: Graph, rows: Integers, shape: VehicleShape) -> Flags:
     return behind
 
 
-def _passing_speeds(graph: Graph, config: PlanningConfig) -> list[tuple[int, float]]:
-    """Futures that are passed close by now, as rows, and at which speed [m/s]."""
+def _passing_speeds(graph: Graph, config: PlanningConfig) -> list[tuple[int, float, float]]:
+    """Futures that are passed close by now, as rows, at which speed [m/s], and from how far before them on [m]."""
     scene, gaps = graph.scene, graph.gaps[:, 0]
     speeds = []
     for row in ((gaps >= 0.0) & (gaps < max(config.person_slow_gap, config.object_slow_gap))).nonzero()[0].tolist():
@@ -191,5 +193,6 @@ def _passing_speeds(graph: Graph, config: PlanningConfig) -> list[tuple[int, flo
             is_slow or scene.is_standing[owner]
         ):
             slowest, more = _SLOW_FOR_PERSON if is_person else _SLOW_FOR_OBJECT
-            speeds.append((row, slowest + more * gap))
+            creeps = is_person and scene.is_standing[owner] and gap < config.person_margin
+            speeds.append((row, _CREEPING, _ROOM_TO_CREEP) if creeps else (row, slowest + more * gap, 0.0))
     return speeds

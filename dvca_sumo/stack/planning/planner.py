@@ -124,7 +124,7 @@ class Planner:
         settled = self._settling.step(lateral, station, start.speed)
         plateaus = [nudge.plateau for nudge in nudges] or settled
         path = path_along(window, start, lateral, plateaus, shape, config)
-        graph = graph_of(scene, window, path, self._route, shape, config)
+        graph = graph_of(scene, window, path, self._route, start.speed, shape, config)
         profile = self._profile(start, graph, views, choice)
         return _points(path, profile), profile.label or _described(nudges, path)
 

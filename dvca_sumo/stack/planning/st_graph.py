@@ -66,10 +66,14 @@ def graph_of(
     window: Window,
     path: Path,
     route: Route,
+    speed: float,
     shape: VehicleShape,
     config: PlanningConfig,
 ) -> Graph:
-    """What comes within its margin of where the ego's body passes, at or ahead of the rear bumper, on its level."""
+    """What comes within its margin of where the ego's body passes, at or ahead of the rear bumper, on its level.
+
+    `speed` is the ego's [m/s].
+    """
     futures = scene.futures
     rows = futures.rows(window)
     gaps = futures.gaps(path.left[rows].max(axis=0), path.right[rows].min(axis=0))
@@ -79,7 +83,7 @@ def graph_of(
     stretch[BEHIND:] = path.arcs - np.arange(count)
     centres = futures.stations + stretch[rows[0]]
     low, high = centres - futures.half_lengths, centres + futures.half_lengths
-    margins = _margins(scene, gaps, window, route.crossings, config)
+    margins = _margins(scene, gaps, window, route.crossings, speed, config)
     occupied = gaps < margins[:, None]
     _let_leave(occupied, scene, gaps, config)
     occupied &= (high > -shape.rear_overhang) & (futures.stations < count - 2)
@@ -149,11 +153,12 @@ def _has_lane_room(scene: Scene, window: Window, shape: VehicleShape) -> Flags:
 
 
 def _margins(
-    scene: Scene, gaps: Floats, window: Window, crossings: tuple[Crossing, ...], config: PlanningConfig
+    scene: Scene, gaps: Floats, window: Window, crossings: tuple[Crossing, ...], speed: float, config: PlanningConfig
 ) -> Floats:
     """(h,) sideways distance within which a future counts as in the way [m].
 
-    It is wider for people who walk across, unless they stay clear of the ego's way or walk away from it.
+    It is wider for people who walk across, unless they stay clear of the ego's way or walk away from it. Past people
+    who stand an ego creeps that is slow already; they may be waiting for it.
     """
     classes = scene.classes[scene.owners]
     margins = np.where(classes == _BICYCLE, config.bicycle_margin, config.object_margin)
@@ -165,6 +170,8 @@ def _margins(
     across = people & (walked > _WALKS_ACROSS * (PREDICTION_TIMES[1] - PREDICTION_TIMES[0]))
     across &= gaps.min(axis=1) < config.person_margin
     margins[people] = config.person_margin
+    if speed < config.creeping_speed:
+        margins[scene.moving :][people[scene.moving :]] = config.object_margin
     margins[across] = config.crossing_person_margin
     for crossing in crossings:
         begin, end = crossing.start_station - _AT_CROSSING, crossing.end_station + _AT_CROSSING

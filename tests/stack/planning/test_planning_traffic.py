@@ -133,6 +133,19 @@ def test_person_standing_at_the_kerb_is_passed_slowly() -> None:
     assert driven.fronts[-1] > 150.0
 
 
+@pytest.mark.parametrize(("y", "passes"), [(-1.53, True), (-1.4, False)])
+def test_past_a_person_who_stands_very_close_to_its_way_the_ego_creeps(y: float, *, passes: bool) -> None:
+    """Each may be waiting for the other. The road has no room to swerve."""
+    route = road()
+    edge = np.full_like(route.road_left, 0.95)
+    narrow = msgspec.structs.replace(route, lane_left=edge, road_left=edge)
+    driven = drive(narrow, 40.0, speed=8.0, actors=[person(3, 100.0, y)])
+    beside = np.abs(driven.fronts - 101.0) < 3.0
+    assert bool(driven.fronts[-1] > 110.0) == passes
+    assert driven.speeds[beside].max(initial=0.0) < 1.2
+    assert driven.clearances.min() > 0.25
+
+
 def test_person_walking_along_the_road_is_just_passed() -> None:
     driven = drive(road(), 15.0, speed=13.0, actors=[person(3, 80.0, -3.5, speed=1.4)])
     assert driven.speeds.min() > 12.5
