@@ -1,13 +1,14 @@
 """Whose doing a violation is, by written rules.
 
 1. The simulator's: see `disturbances`.
-2. The other one's: it ran into the standing ego; it ran into the ego from behind while the ego was in its lane; it
+2. The other one's: it ran into the standing ego; it ran into the rear of the ego while that was in its lane; it
    touched the flank of an ego that was in its lane and not on a junction. Then time to collision and distance to that
    same object just before are its doing, too. And a destination is not reached for the others' sake when SUMO's own
    driver on the same trip had not arrived after the same time either, or when it ends in a jam: see `jams`.
 3. Everything else is the driver's: the ego's own. Traffic rules are always the driver's.
 
-The ego is in its lane when no corner of its body is more than 0.3 m beyond the edges of the lane under its middle.
+The ego, or its rear, is in its lane when no corner is more than 0.3 m beyond the edges of the lane under its middle.
+In sharp turns the front sweeps out further.
 """
 
 import enum
@@ -17,6 +18,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.boxes import box_of, corners
+from dvca_sumo.messages import Floats
 from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.roadmap import Lane, RoadMap
 from dvca_sumo.screen.disturbances import Disturbance, Disturbances
@@ -25,6 +27,7 @@ from dvca_sumo.violations import Contact, Judgement, Violation
 
 _TOLERANCE = 0.3  # [m] as of the oracle of the lane
 _NEAR = 3.0  # [m] from its middle a lane is under the ego
+_REAR = slice(1, 3)  # of the corners of a box
 _BEFORE = 5.0  # [s] before a contact what is about the same object belongs to it
 
 
@@ -88,20 +91,21 @@ def _excuse(contact: Violation, moment: Moment, roadmap: RoadMap) -> str:
         return "ran into the standing ego"
     if contact.contact is Contact.ACTIVE_FRONT:
         return ""
-    lane = _lane_kept(moment, roadmap)
-    if lane is not None and contact.contact is Contact.HIT_FROM_BEHIND:
-        return "ran into the ego from behind"
+    ego = moment.ego
+    box = box_of(ego.x, ego.y, ego.heading, moment.shape)
+    spots = corners(box[None])[0]
+    if contact.contact is Contact.HIT_FROM_BEHIND:
+        return "ran into the ego from behind" if _lane_kept(spots[_REAR], box, roadmap) is not None else ""
+    lane = _lane_kept(spots, box, roadmap)
     return "touched the ego in its lane" if lane is not None and not lane.is_internal else ""
 
 
-def _lane_kept(moment: Moment, roadmap: RoadMap) -> Lane | None:
-    """The lane under the ego's middle if the whole ego is in it."""
-    ego = moment.ego
-    box = box_of(ego.x, ego.y, ego.heading, moment.shape)
+def _lane_kept(spots: Floats, box: Floats, roadmap: RoadMap) -> Lane | None:
+    """The lane under the middle of the ego's `box` (5,) if all `spots` (n, 2) are in it."""
     near = roadmap.lanes_near(box[None, :2], _NEAR)[0]
     for name in near:
         lane = roadmap.lanes[name]
-        _, offsets = lane.line.project(corners(box[None])[0])
+        _, offsets = lane.line.project(spots)
         if float(np.abs(offsets).max()) <= 0.5 * lane.width + _TOLERANCE:
             return lane
     return None

@@ -216,6 +216,8 @@ def test_being_run_into_from_behind_is_the_others_unless_the_ego_left_its_lane(r
 
     assert at_contact(hit(LANE_Y), roads) == [("collision", Fault.OTHER)]
     assert at_contact(hit(LANE_Y + 1.6), roads) == [("collision", Fault.DRIVER)]
+    aslant = [msgspec.structs.replace(one, ego=msgspec.structs.replace(one.ego, heading=0.4)) for one in hit(LANE_Y)]
+    assert at_contact(aslant, roads) == [("collision", Fault.OTHER)]  # its front has swept out, its rear is in the lane
 
 
 def test_a_standing_ego_is_never_at_fault(roads: RoadMap) -> None:
