@@ -14,6 +14,7 @@ from dvca_sumo.roadmap import RouteError
 from dvca_sumo.run import Departing, opened
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.screen.driving import Driven, Heard
+from dvca_sumo.screen.neighbours import Neighbourhood
 from dvca_sumo.screen.results import TripOutcome, TripResult, Watch
 from dvca_sumo.screen.trips import Trip
 from dvca_sumo.stack.reference import reference_stack
@@ -36,9 +37,11 @@ def anchored(scenario: Scenario, trips: Sequence[Trip], hear: Heard) -> Driven:
     awaited = {trip.ego for trip in trips}
     rides: list[_Ride] = []
     results: list[TripResult] = []
+    neighbourhood = Neighbourhood()
     with opened(scenario) as world:
         while (awaited or rides) and not world.is_exhausted and not _is_late(world, scenario):
             world.advance()
+            neighbourhood.see(world)
             arrived = world.arrived()
             for name in world.departed():
                 if name in awaited:
@@ -56,7 +59,7 @@ def anchored(scenario: Scenario, trips: Sequence[Trip], hear: Heard) -> Driven:
             hear(world.time, len(results))
         results += [ride.cut() for ride in rides]
     results += [TripResult(name, TripOutcome.NOT_DRIVEN, "it did not depart") for name in sorted(awaited)]
-    return Driven(tuple(results))
+    return Driven(tuple(results), neighbourhood.seen())
 
 
 def _is_late(world: World, scenario: Scenario) -> bool:

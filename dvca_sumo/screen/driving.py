@@ -8,6 +8,7 @@ import msgspec
 from dvca_sumo.engine.replay import roadmap
 from dvca_sumo.run import Departing, Drive, Over, Simulation, Task, built_here, opened
 from dvca_sumo.scenario import Scenario, ScenarioError
+from dvca_sumo.screen.neighbours import Neighbourhood, Neighbours
 from dvca_sumo.screen.results import TripOutcome, TripResult, Watch
 from dvca_sumo.screen.trips import SLOWER, Trip
 from dvca_sumo.stack.reference import StackError
@@ -25,6 +26,7 @@ class Driven(msgspec.Struct, frozen=True):
     """What one simulation brought."""
 
     results: tuple[TripResult, ...]
+    neighbours: Neighbours
     crowded_out: tuple[str, ...] = ()  # egos that departed when as many as are allowed were under way
 
 
@@ -69,6 +71,7 @@ class _Fleet:
         self._watches: dict[str, Watch] = {}  # by ego
         self._results: list[TripResult] = []
         self._crowded_out: list[str] = []
+        self._neighbourhood = Neighbourhood()
 
     def proceed(self, hear: Heard) -> Driven:
         while self._awaited or self._simulation.drives:
@@ -76,10 +79,11 @@ class _Fleet:
             if not self._awaited and not self._simulation.drives:
                 break
             self._finish(self._simulation.advance())
+            self._neighbourhood.see(self._world)
             self._admit()
             self._give_up()
             hear(self._world.time, len(self._results))
-        return Driven(tuple(self._results), tuple(self._crowded_out))
+        return Driven(tuple(self._results), self._neighbourhood.seen(), tuple(self._crowded_out))
 
     def _see(self, drive: Drive, moment: Moment) -> None:
         self._watches[drive.ego.name].see(moment)

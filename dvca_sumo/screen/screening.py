@@ -14,6 +14,7 @@ from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.screen.anchor import anchored
 from dvca_sumo.screen.driving import Driven, Heard, driven, planned
 from dvca_sumo.screen.judging import Fault, Judged
+from dvca_sumo.screen.neighbours import Neighbours, together
 from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.trips import Draw, Trip, drawn
 from dvca_sumo.stack.sources import StackSource, stack_factory
@@ -40,6 +41,8 @@ class Screening(msgspec.Struct, frozen=True):
     draw: Draw
     ads: tuple[TripResult, ...]  # in the order of the trips
     sumo_driver: tuple[TripResult, ...]  # likewise
+    ads_neighbours: Neighbours  # where trips of the draw were driven first; not where some were driven again, alone
+    sumo_neighbours: Neighbours
 
 
 class Progress:
@@ -95,7 +98,7 @@ class _Work:
         )
         if isinstance(anchor, Failure):
             raise raised(anchor)
-        results = self._whole(batches, answers)
+        results, neighbours = self._whole(batches, answers)
         alone = self._alone(batches, results)
         natives = {result.ego: result for result in anchor.results}
         return Screening(
@@ -103,6 +106,8 @@ class _Work:
             draw,
             tuple(_marked(excused(results[ego], natives[ego]), alone.get(ego)) for ego in self._trips),
             tuple(natives[ego] for ego in self._trips),
+            neighbours,
+            anchor.neighbours,
         )
 
     def _draw(self) -> Draw:
@@ -121,9 +126,12 @@ class _Work:
             self._stores.draws.add(key, answer)
         return answer
 
-    def _whole(self, batches: list[list[Trip]], answers: list[Driven | Failure]) -> dict[str, TripResult]:
+    def _whole(
+        self, batches: list[list[Trip]], answers: list[Driven | Failure]
+    ) -> tuple[dict[str, TripResult], Neighbours]:
         """The results of all trips: those that were crowded out, or went down with others, are driven again."""
         results: dict[str, TripResult] = {}
+        neighbours: list[Neighbours] = []
         while batches:
             again: list[list[Trip]] = []
             crowded_out: list[Trip] = []
@@ -131,6 +139,7 @@ class _Work:
                 if isinstance(answer, Driven):
                     results |= {result.ego: result for result in answer.results}
                     crowded_out += [self._trips[ego] for ego in answer.crowded_out]
+                    neighbours.append(answer.neighbours)
                 elif len(batch) > 1:
                     again += [[trip] for trip in batch]
                 else:
@@ -139,7 +148,7 @@ class _Work:
             if batches:
                 self._progress.stage("trips that found no place beside the others", len(batches))
                 answers = self._simulated(["ads"] * len(batches), batches, self._setting.concurrent)
-        return results
+        return results, together(neighbours)
 
     def _alone(self, batches: list[list[Trip]], results: dict[str, TripResult]) -> dict[str, TripResult]:
         """Trips with violations, driven with no other ego in the simulation."""

@@ -12,6 +12,7 @@ import msgspec
 from dvca_sumo.intervals import Rate, Share, rate_of, share_of
 from dvca_sumo.oracles import ORACLES
 from dvca_sumo.screen.judging import Fault
+from dvca_sumo.screen.neighbours import Neighbours
 from dvca_sumo.screen.results import TripOutcome, TripResult
 
 NEAR = (1, 2, 3)  # [s] of time to collision
@@ -38,6 +39,14 @@ class Quartiles(msgspec.Struct, frozen=True):
     high: float | None
 
 
+class NeighboursSummary(msgspec.Struct, frozen=True):
+    """How SUMO's own vehicles fared in the simulations of one driver."""
+
+    hours: float  # [h] that they were under way, all together
+    stood_per_100_hours: Rate  # of them, for two minutes or longer without a stop of their own
+    teleports_per_100_hours: Rate
+
+
 class DriverSummary(msgspec.Struct, frozen=True):
     """All trips of one driver."""
 
@@ -59,10 +68,11 @@ class DriverSummary(msgspec.Struct, frozen=True):
     hard_brakings_per_100_km: Rate
     least_ttc: Quartiles  # [s] of the trips with one below the horizon
     ttc_below: dict[str, Share]  # by seconds: trips with a shorter one
+    neighbours: NeighboursSummary
 
 
-def summary_of(results: Sequence[TripResult], like: Sequence[TripResult]) -> DriverSummary:
-    """Sum up one driver's trips; travel times are relative to those of `like`."""
+def summary_of(results: Sequence[TripResult], like: Sequence[TripResult], neighbours: Neighbours) -> DriverSummary:
+    """Sum up one driver's trips among `neighbours`; travel times are relative to those of `like`."""
     trips = [result for result in results if result.outcome is not TripOutcome.NOT_DRIVEN]
     km = sum(trip.distance for trip in trips) / 1000.0
     faults = Counter(one.fault for trip in trips for one in trip.violations)
@@ -96,6 +106,11 @@ def summary_of(results: Sequence[TripResult], like: Sequence[TripResult]) -> Dri
         hard_brakings_per_100_km=rate_of(sum(trip.hard_brakings for trip in trips), km / 100.0),
         least_ttc=_quartiles(nearest),
         ttc_below={str(limit): share_of(sum(ttc < limit for ttc in nearest), len(trips)) for limit in NEAR},
+        neighbours=NeighboursSummary(
+            hours=neighbours.hours,
+            stood_per_100_hours=rate_of(neighbours.stood, neighbours.hours / 100.0),
+            teleports_per_100_hours=rate_of(neighbours.teleports, neighbours.hours / 100.0),
+        ),
     )
 
 

@@ -93,7 +93,11 @@ def command(setting: Setting, ego: str) -> str:
 
 
 def _summaries(screening: Screening) -> tuple[DriverSummary, DriverSummary]:
-    return summary_of(screening.ads, screening.sumo_driver), summary_of(screening.sumo_driver, screening.sumo_driver)
+    anchor = screening.sumo_driver
+    return (
+        summary_of(screening.ads, anchor, screening.ads_neighbours),
+        summary_of(anchor, anchor, screening.sumo_neighbours),
+    )
 
 
 def _violation(trip: TripResult, one: Judged, setting: Setting, driver: str) -> Json:
@@ -173,6 +177,11 @@ _ROWS: Sequence[tuple[str, Callable[[DriverSummary], str]]] = (
     ("trips with one below 1 s", lambda one: _share(one.ttc_below["1"])),
     ("below 2 s", lambda one: _share(one.ttc_below["2"])),
     ("below 3 s", lambda one: _share(one.ttc_below["3"])),
+    (
+        "SUMO's vehicles that stood for 2 min, per 100 h of theirs",
+        lambda one: _rate(one.neighbours.stood_per_100_hours, 1),
+    ),
+    ("teleports of theirs, per 100 h", lambda one: _rate(one.neighbours.teleports_per_100_hours, 1)),
 )
 
 

@@ -87,6 +87,14 @@ class World:
         """Whether a vehicle that is under way makes a stop of its own now, parks or waits for somebody."""
         return self._session.is_stopping(vehicle)
 
+    def teleported(self) -> tuple[str, ...]:
+        """Vehicles that SUMO began to teleport in the last step."""
+        return self._session.teleported()
+
+    def waits(self) -> dict[str, float]:
+        """How long each vehicle that SUMO drives has stood [s], by name; 0 while it makes a stop of its own."""
+        return self._session.waits()
+
     def entry(self, vehicle: str, settings: Sequence[str]) -> Entry:
         """How a vehicle that has just departed stands, and its "dvca." parameters among `settings`."""
         return self._session.entry(vehicle, settings)

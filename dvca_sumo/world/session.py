@@ -196,6 +196,16 @@ class Session:
         """Whether a vehicle that is in the simulation makes a stop of its own."""
         return bool(libsumo.vehicle.isStopped(vehicle))
 
+    def teleported(self) -> tuple[str, ...]:
+        """Vehicles that SUMO began to teleport in the last step."""
+        return tuple(libsumo.simulation.getStartingTeleportIDList())
+
+    def waits(self) -> dict[str, float]:
+        """How long each vehicle that SUMO drives has stood [s]; 0 while it makes a stop of its own."""
+        of = libsumo.vehicle
+        names = (name for name in of.getIDList() if name not in self._adopted)
+        return {name: 0.0 if of.isStopped(name) else float(of.getWaitingTime(name)) for name in names}
+
     def motion(self, vehicle: str) -> Motion:
         """How a vehicle moves that SUMO drives."""
         of = libsumo.vehicle

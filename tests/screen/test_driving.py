@@ -115,3 +115,24 @@ def test_an_ego_held_up_in_a_jam_is_not_at_fault(
     assert result.outcome is TripOutcome.TIME_OVER
     assert [(one.violation.kind, one.fault) for one in result.violations] == [("destination_not_reached", fault)]
     assert ("other" in result.violations[0].reason) == (fault is Fault.OTHER)
+    assert found.neighbours.stood == (fault is Fault.OTHER)
+    assert found.neighbours.hours == pytest.approx(result.duration / 3600.0, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("patience", "stood", "teleports"), [("-1", 2, 0), ("130", 1, 1)], ids=["for ever", "the first is teleported"]
+)
+def test_sumos_vehicles_that_stand_and_are_teleported_are_counted(
+    tmp_path: Path, plain_file: Callable[..., Path], patience: str, stood: int, teleports: int
+) -> None:
+    net = plain_file(
+        '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/>', '<edge id="we" from="w" to="e" speed="13.9"/>'
+    )
+    routes = (
+        '<vType id="stuck" maxSpeed="0.01"/><vehicle id="other" type="stuck" depart="0" departPos="195">'
+        '<route edges="we"/></vehicle><trip id="ego" from="we" to="we" depart="1"/>'
+    )
+    scenario = traffic(tmp_path, net, routes, end="200", time_to_teleport=patience)
+    found = in_child(partial(anchored, scenario, [Trip("ego", 1.0, 395.0, 29.0, 40.0)], HEAR)).neighbours
+    assert (found.stood, found.teleports) == (stood, teleports)
+    assert 0.0 < found.hours <= 2 * 200.0 / 3600.0

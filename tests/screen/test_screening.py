@@ -11,6 +11,7 @@ from screen_scenes import traffic
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.screen.driving import Driven
 from dvca_sumo.screen.judging import Fault, Judged
+from dvca_sumo.screen.neighbours import Neighbours
 from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.screening import Progress, Screening, Setting, Stores, excused, screened
 from dvca_sumo.screen.summary import summary_of
@@ -57,7 +58,7 @@ def test_the_healthy_stack_is_clean_and_goes_on_from_what_was_kept(tmp_path: Pat
     screening = screening_of(scenario, folder=tmp_path / "kept", progress=heard)
     assert not has_failed(screening)
     assert not has_gaps(screening)
-    ads = summary_of(screening.ads, screening.sumo_driver)
+    ads = summary_of(screening.ads, screening.sumo_driver, screening.ads_neighbours)
     assert (ads.trips, ads.completed.count, ads.at_fault_violations) == (2, 2, 0)
     assert ads.travel_time_ratio.count == 2
     assert 0.8 < (ads.travel_time_ratio.median or 0.0) < 1.8
@@ -73,6 +74,7 @@ def test_what_is_said_as_data(reckless: Screening) -> None:
         wanted = {"trips", "completed", "km", "at_fault_collisions", "at_fault_violations", "by_oracle"}
         assert wanted | {"travel_time_ratio"} <= set(said[driver])
         assert {"collision", "ttc", "speed_limit", "no_progress"} <= set(said[driver]["by_oracle"])
+        assert said[driver]["neighbours"]["teleports_per_100_hours"]["count"] == 0
     assert said["ads"]["at_fault_violations"] > 0
     assert said["ads"]["by_oracle"]["speed_limit"]["trips"]["count"] > 0
     assert said["sumo_driver"]["completed"]["count"] == 2
@@ -102,7 +104,7 @@ def test_a_trip_that_the_simulator_ended_is_counted_apart() -> None:
     trips += [
         TripResult(fault, TripOutcome.CONTACT, violations=(Judged("collision", contact, fault, ""),)) for fault in Fault
     ]
-    found = summary_of(trips, [])
+    found = summary_of(trips, [], Neighbours(0.0, 0, 0))
     assert (found.trips, found.ended_by_simulator, found.completed.count, found.completed.total) == (4, 1, 1, 3)
 
 
