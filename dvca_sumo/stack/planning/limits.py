@@ -127,8 +127,9 @@ def nearest_stop(
     if obstacle is not None:
         label = f"stop behind {graph.track(obstacle)}"
         gap = -config.object_gap if config.stops_past_objects else config.object_gap
-        occupied_from = float(graph.low[obstacle, 0]) - shape.front
-        stops.append(Stop(occupied_from - gap, config.object_gap - _GIVE_AT_OBJECT, label))
+        usual = float(graph.low[obstacle, 0]) - shape.front - gap
+        closer = _closing_up(usual, views, shape, config)
+        stops.append(Stop(usual + closer, config.object_gap - closer - _GIVE_AT_OBJECT, label))
     if views and graph.occupied[:, 0].any():
         those = ahead(graph, shape)
         for view in views:
@@ -146,6 +147,15 @@ def _before_blocked(
     is_inside = place > view.distance and view.may_wait
     if is_inside and is_blocked(view, max(place, _HERE), those, speed, shape, config):
         yield Stop(place, config.stop_line_gap, _OCCUPIED)
+
+
+def _closing_up(usual: float, views: list[LineView], shape: VehicleShape, config: PlanningConfig) -> float:
+    """How much further than at a `usual` place the front bumper stops, so that the rear one is off a junction [m]."""
+    for view in views:
+        left = view.distance + view.line.exit_station - view.line.station - (usual - shape.length)
+        if view.line.crosses and 0.0 < left <= config.object_gap - config.follow_gap:
+            return left
+    return 0.0
 
 
 def _at_line(distance: float, label: str, config: PlanningConfig) -> Stop:

@@ -83,6 +83,15 @@ def test_standing_car_in_a_single_lane_is_stopped_behind() -> None:
     assert_drivable(driven)
 
 
+@pytest.mark.parametrize(("room", "front"), [(9.8, 96.8), (8.8, 96.6), (8.2, 79.2)])
+def test_behind_a_queue_past_a_junction_the_ego_closes_up_or_stays_out(room: float, front: float) -> None:
+    """The junction is from 80 m to 92 m, and the ego 4.6 m long: never does it stand on it."""
+    line = stop_line(80.0, Control.PRIORITY, yields_to=frozenset())
+    driven = drive(road(stop_lines=[line]), 40.0, speed=8.0, actors=[car(3, 92.0 + room + 2.25)])
+    assert driven.speeds[-1] == 0.0
+    assert driven.fronts[-1] == pytest.approx(front, abs=0.15)
+
+
 def test_car_behind_is_no_reason_to_do_anything() -> None:
     driven = drive(road(), 10.0, speed=13.0, actors=[car(4, -15.0, speed=15.0)])
     assert set(driven.decisions) == {"cruise"}
