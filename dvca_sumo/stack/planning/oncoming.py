@@ -40,8 +40,8 @@ def waits(
     for row in comes.nonzero()[0].tolist():
         spare, is_left = _spare(row, futures, window)
         beyond = left if is_left else right
-        meets = beyond > max(spare - config.object_margin, 0.0)
-        if not meets.any() or (beyond[begun] > max(spare, 0.0)).any():
+        meets = beyond > np.maximum(spare - config.object_margin, 0.0)
+        if not meets.any() or (beyond[begun] > np.maximum(spare[begun], 0.0)).any():
             continue
         begin, end = _first(meets, shape.length + config.yield_gap)
         nose, tail = float(graph.path.arcs[begin]) - shape.front, float(graph.path.arcs[end]) + shape.rear_overhang
@@ -63,14 +63,22 @@ def _beyond_lane(graph: Graph, window: Window, views: list[LineView]) -> tuple[F
     return left[BEHIND:], right[BEHIND:]
 
 
-def _spare(row: int, futures: Extents, window: Window) -> tuple[float, bool]:
-    """How far beyond the lane's edge who comes, as future `row` has it, stays in the end [m]; whether on the left."""
-    ahead = (futures.stations[row] > 0.0).nonzero()[0]
-    column = int(ahead[-1]) if ahead.size else 0
-    place = int(window.index(futures.stations[row, column : column + 1])[0])
-    offset = float(futures.offsets[row, column])
-    edge = window.lane_left[place] if offset > 0.0 else -window.lane_right[place]
-    return abs(offset) - float(futures.half_widths[row, column]) - float(edge), offset > 0.0
+def _spare(row: int, futures: Extents, window: Window) -> tuple[Floats, bool]:
+    """How far beyond the lane's edge who comes, as future `row` has it, stays by metre ahead [m]; whether on the left.
+
+    Where it does not get to within its future: as far as at the nearest place that it does get to.
+    """
+    ahead = futures.stations[row] > 0.0
+    if not ahead.any():
+        ahead[0] = True
+    stations, offsets = futures.stations[row, ahead], futures.offsets[row, ahead]
+    is_left = bool(offsets[-1] > 0.0)
+    places = window.index(stations)
+    sideways = offsets - window.lane_left[places] if is_left else window.lane_right[places] - offsets
+    spare = sideways - futures.half_widths[row, ahead]
+    nearest_first = np.argsort(stations, kind="stable")
+    metres = np.arange(window.rows.shape[1] - BEHIND)
+    return np.interp(metres, stations[nearest_first], spare[nearest_first]), is_left
 
 
 def _first(meets: Flags, bridged: float) -> tuple[int, int]:

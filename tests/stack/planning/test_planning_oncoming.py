@@ -64,6 +64,17 @@ def test_who_comes_far_enough_to_the_side_is_not_waited_for() -> None:
     assert driven.clearances.min() > 0.5
 
 
+@pytest.mark.parametrize(("x", "speed"), [(125.0, 9.0), (135.0, 9.0), (150.0, 11.0)])
+def test_room_is_told_where_the_ego_needs_it_and_not_where_its_lane_is_wider(x: float, speed: float) -> None:
+    route = swerving(1.0)
+    edge = route.lane_left + np.where(route.line.stations < 88.0, 1.2, 0.0)
+    route = msgspec.structs.replace(route, lane_left=edge, road_left=edge)
+    others = [car(5, x, 4.4, heading=math.pi, speed=speed)]
+    driven = drive(route, 15.0, station=70.0, speed=8.0, actors=others)
+    assert driven.speeds.min() > 7.0
+    assert driven.clearances.min() > 0.5
+
+
 def test_who_comes_is_waited_for_where_the_ego_itself_will_come_back_on_that_lane() -> None:
     x = np.arange(0.0, 116.0)
     aside = 1.8 * (1.0 - np.cos(math.pi * np.clip((x - 102.0) / 13.0, 0.0, 1.0)))
