@@ -10,7 +10,7 @@ from dvca_sumo.roadmap.walkways import Ground, Walkways, Way, room
 from dvca_sumo.stack.hypotheses import Hypotheses
 
 _HORIZON = float(PREDICTION_TIMES[-1])  # [s]
-_TURNS = np.array([0.5, -0.5, 1.0, -1.0])  # that are looked at, as shares of the widest
+_TURNS = np.array([0.25, -0.25, 0.5, -0.5, 1.0, -1.0])  # that are looked at, as shares of the widest
 
 
 class WalkingConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -43,9 +43,9 @@ class Walking:
     def hypotheses(self, tracked: TrackedObjects, rows: Integers) -> Hypotheses:
         """The futures of people `rows`, who move.
 
-        Who is on a pavement walks on along it, stays at its kerb, and may use each crossing ahead, all equally likely;
-        who is about to step off it, whatever slight turn it makes, who is on the road or on a crossing, goes straight
-        on.
+        Who is on a pavement walks on along it, turning slightly where that keeps it on, else stays at its kerb, and may
+        use each crossing ahead, all equally likely; who is about to step off it, whatever slight turn it makes, who is
+        on the road or on a crossing, goes straight on.
         """
         points, velocities = tracked.boxes[rows, :2], tracked.velocities[rows]
         speeds = np.hypot(velocities[:, 0], velocities[:, 1])
@@ -75,20 +75,30 @@ class Walking:
     def _along_grounds(
         self, points: Floats, directions: Floats, lengths: Floats, enough: Floats, grounds: list[Ground]
     ) -> tuple[Floats, Floats]:
-        """Directions (n, 2) of people, turned where the ground ends within `enough` (n,), and how far they get on it.
+        """Directions (n, 2) of people, turned where the ground ends within `lengths` (n,), and how far they get on it.
 
-        They are turned by as little as gets them farther than that, if anything does. Lengths are in m.
+        They are turned by as little as gets them so far, else by as little as gets them farther than `enough` (n,), if
+        anything does. Lengths are in m.
         """
-        directions, rooms = directions.copy(), room(points, directions, lengths, grounds)
-        for turn in self._config.veering * _TURNS:
-            short = (rooms <= enough).nonzero()[0]
-            if not short.size:
-                break
-            along, across = directions[short].T
-            turned = np.cos(turn) * directions[short] + np.sin(turn) * np.column_stack((-across, along))
-            found = room(points[short], turned, lengths[short], [grounds[row] for row in short.tolist()])
-            is_enough = found > enough[short]
-            directions[short[is_enough]], rooms[short[is_enough]] = turned[is_enough], found[is_enough]
+        rooms = room(points, directions, lengths, grounds)
+        short = (rooms < lengths).nonzero()[0]
+        if not short.size:
+            return directions, rooms
+        turns = self._config.veering * _TURNS[:, None, None]
+        left = np.column_stack((-directions[short, 1], directions[short, 0]))
+        turned = np.cos(turns) * directions[short] + np.sin(turns) * left  # (turns, people, 2)
+        count = len(_TURNS)
+        found = room(
+            np.tile(points[short], (count, 1)),
+            turned.reshape(-1, 2),
+            np.tile(lengths[short], count),
+            [grounds[row] for row in short.tolist()] * count,
+        ).reshape(count, -1)
+        reaches, is_enough = found >= lengths[short], (rooms[short] <= enough[short]) & (found > enough[short])
+        wanted = np.where(reaches.any(axis=0), reaches, is_enough)
+        columns, first = np.flatnonzero(wanted.any(axis=0)), wanted.argmax(axis=0)
+        chosen, directions = short[columns], directions.copy()
+        directions[chosen], rooms[chosen] = turned[first[columns], columns], found[first[columns], columns]
         return directions, rooms
 
     def _crossings(

@@ -75,10 +75,18 @@ def test_along_the_pavement_they_walk_straight_on(roadmap: RoadMap) -> None:
     assert found.lanes == ((lane,),)
 
 
-def test_aslant_to_the_kerb_they_stay_on_the_pavement(roadmap: RoadMap) -> None:
+def test_slightly_aslant_to_the_kerb_they_walk_on_along_it(roadmap: RoadMap) -> None:
+    place, heading, _ = pavement(roadmap)
+    found = walking(roadmap, place, heading + 0.2)
+    assert found.probabilities.tolist() == [1.0]
+    assert found.poses[0, :, 1].max() < place[1] + 1.0
+    assert np.hypot(*(found.poses[0, -1, :2] - place)) == pytest.approx(SPEED * PREDICTION_TIMES[-1])
+
+
+def test_more_aslant_to_the_kerb_they_stay_at_it(roadmap: RoadMap) -> None:
     place, heading, _ = pavement(roadmap)
     kerb = float(place[1]) + 1.0
-    found = walking(roadmap, place, heading + 0.2)
+    found = walking(roadmap, place, heading + 0.6)
     assert found.probabilities.tolist() == [1.0]
     assert kerb - 0.4 < found.poses[0, -1, 1] < kerb
 
