@@ -32,7 +32,8 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     curvature: float = 0.15  # [1/m] of a sideways move at low speed: within the steering of a car
 
     # Distances kept lengthwise, from the front bumper.
-    stop_line_gap: float = 0.8  # [m] before a stop line
+    stop_line_gap: float = 0.8  # [m] before a stop line ...
+    crossing_gap: float = 1.5  # [m] ... and before the pedestrian crossing behind it: people step beside that, too
     object_gap: float = 5.0  # [m] behind what stands: leaves room to pull out later
     yield_gap: float = 2.0  # [m] before the way of a crossing vehicle
     person_gap: float = 3.0  # [m] before the way of a crossing person

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import msgspec
 
 from dvca_sumo.messages import SignalColour, TrackedObjects, VehicleShape
-from dvca_sumo.roadmap.route import Control, Route, StopLine
+from dvca_sumo.roadmap.route import Control, Crossing, Route, StopLine
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.watching import WatchList
 
@@ -28,6 +28,7 @@ class LineView(NamedTuple):
 
     line: StopLine
     distance: float  # [m] from the front bumper
+    gap: float  # [m] that the ego keeps before it, at least
     stop: str | None  # why the ego must not cross it, if it must not
     goes_first: frozenset[str]  # lanes whose traffic has priority
     waiting_distance: float  # [m] from the front bumper to where it is let pass
@@ -45,6 +46,7 @@ class Junctions:
         self._config = config
         self._lines = _with_room_between(route.stop_lines, shape.length)
         self._exits = [line.exit_station for line in self._lines]
+        self._gaps = [_gap(line, route.crossings, config) for line in self._lines]
         self._seen: dict[str, tuple[float, SignalColour]] = {}
         self._entered: set[int] = set()  # lines crossed on yellow, for which it was too late to stop
         self._kept: set[int] = set()  # lines that it has begun to stop at on yellow or red
@@ -79,7 +81,8 @@ class Junctions:
         return views
 
     def _view(self, index: int, distance: float, time: float, speed: float) -> LineView:
-        line, waiting_distance = self._lines[index], distance - self._config.stop_line_gap
+        line, gap = self._lines[index], self._gaps[index]
+        waiting_distance = distance - gap
         if line.control is Control.SIGNAL:
             stop, goes_first = self._at_signal(index, distance, time, speed)
             if line.waiting_station is not None and self._colour(line.signal_id or "", time) in _GREENS:
@@ -88,7 +91,7 @@ class Junctions:
             stop, goes_first = None, line.yields_to
             if line.control in (Control.STOP, Control.ALL_WAY_STOP) and index not in self._released:
                 stop = self._at_sign(index, time)
-        return LineView(line, distance, stop if distance > -_OVERRUN else None, goes_first, waiting_distance)
+        return LineView(line, distance, gap, stop if distance > -_OVERRUN else None, goes_first, waiting_distance)
 
     def _at_sign(self, index: int, time: float) -> str | None:
         """Whether to stand on: for a while, and for those who were there first."""
@@ -140,6 +143,12 @@ class Junctions:
         if time - self._standing.get(index, time) >= wait:
             self._released.add(index)
         return index in self._released
+
+
+def _gap(line: StopLine, crossings: Sequence[Crossing], config: PlanningConfig) -> float:
+    """What is kept before a line, of which a pedestrian crossing may begin close behind [m]."""
+    behind = [crossing.start_station - line.station for crossing in crossings if crossing.end_station > line.station]
+    return max(config.stop_line_gap, config.crossing_gap - min(behind, default=config.crossing_gap))
 
 
 def _with_room_between(lines: Sequence[StopLine], length: float) -> list[StopLine]:

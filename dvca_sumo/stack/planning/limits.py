@@ -122,7 +122,7 @@ def nearest_stop(
     `to_destination` counts from the front bumper [m]; `speed` is the ego's [m/s].
     """
     stops = [Stop(to_destination, _GIVE_AT_DESTINATION, "stop destination")]
-    stops += [_at_line(view.distance, view.stop, config) for view in views if view.stop]
+    stops += [_at_line(view, view.stop) for view in views if view.stop]
     obstacle = _obstacle(graph, shape, config)
     if obstacle is not None:
         label = f"stop behind {graph.track(obstacle)}"
@@ -142,7 +142,7 @@ def _before_blocked(
 ) -> Iterator[Stop]:
     """At the line, and at the place on the junction where others are let pass, if there is one."""
     if is_blocked(view, view.distance, those, speed, shape, config):
-        yield _at_line(view.distance, _OCCUPIED, config)
+        yield _at_line(view, _OCCUPIED)
     place = view.waiting_distance
     is_inside = place > view.distance and view.may_wait
     if is_inside and is_blocked(view, max(place, _HERE), those, speed, shape, config):
@@ -158,8 +158,8 @@ def _closing_up(usual: float, views: list[LineView], shape: VehicleShape, config
     return 0.0
 
 
-def _at_line(distance: float, label: str, config: PlanningConfig) -> Stop:
-    return Stop(distance - config.stop_line_gap, config.stop_line_gap, label)
+def _at_line(view: LineView, label: str) -> Stop:
+    return Stop(view.distance - view.gap, view.gap, label)
 
 
 def _obstacle(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> int | None:

@@ -8,7 +8,7 @@ import pytest
 from planned_drives import LIMIT, SHAPE, Drive, assert_drivable, curve_points, drive, road, stop_line
 
 from dvca_sumo.messages import Floats, SignalColour
-from dvca_sumo.roadmap.route import Control, Route
+from dvca_sumo.roadmap.route import Control, Crossing, Route
 from dvca_sumo.stack.planning import PlanningConfig
 
 
@@ -91,6 +91,14 @@ def test_red_light_is_stopped_at_before_the_line() -> None:
     assert driven.speeds[-1] == 0.0
     assert driven.decisions[-1] == "stop red J/2"
     assert_drivable(driven)
+
+
+@pytest.mark.parametrize(("crossing", "kept"), [((120.0, 124.0), 1.5), ((120.5, 124.5), 1.0), ((123.0, 127.0), 0.8)])
+def test_room_is_left_to_people_on_a_crossing_behind_the_line(crossing: tuple[float, float], kept: float) -> None:
+    route = road(stop_lines=[stop_line(120.0, Control.SIGNAL)], crossings=[Crossing("c", *crossing)])
+    driven = drive(route, 20.0, speed=13.0, signals=lambda _: {"J/2": SignalColour.RED})
+    assert driven.speeds[-1] == 0.0
+    assert 120.0 - driven.fronts[-1] == pytest.approx(kept, abs=0.15)
 
 
 def test_goes_when_red_turns_green() -> None:
