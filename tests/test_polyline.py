@@ -92,6 +92,14 @@ def test_window_tells_the_two_passes_of_a_crossing_apart() -> None:
     assert second[0] == pytest.approx(half, abs=1.0)
 
 
+def test_points_are_each_looked_for_near_a_station_of_their_own() -> None:
+    line = figure_eight()
+    half = line.length / 2.0
+    stations, offsets = line.project_near(np.array([[0.1, 0.0], [0.1, 0.0]]), np.array([8.0, half + 8.0]), 20.0)
+    assert stations == pytest.approx([0.0, half], abs=1.0)
+    assert np.abs(offsets) == pytest.approx(0.07, abs=0.01)
+
+
 def test_window_limits_the_stations() -> None:
     stations, _ = winding().project([[0.0, 0.0], [1e4, 1e4]], between=(100.0, 150.0))
     assert (stations >= 100.0).all()

@@ -90,12 +90,18 @@ class Polyline:
         """
         low, high = (0.0, self.length) if between is None else self._window(*between)
         xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-        local = np.ones((len(xy), 3))
-        np.subtract(xy, self.points[0], out=local[:, :2])
-        first, nearest, squares = self._nearest(local, low, high)
+        first, nearest, squares = self._nearest(self._local(xy), low, high)
         segments = squares.argmin(axis=1)
         stations = self.stations[segments + first] + nearest[np.arange(len(xy)), segments]
         return self._refined(xy, stations, low, high)
+
+    def project_near(self, points: Floats, stations: Floats, reach: float) -> tuple[Floats, Floats]:
+        """As `project`, of points (m, 2), each looked for within `reach` of a station (m,) of its own [m]."""
+        _, nearest, squares = self._nearest(self._local(points), 0.0, self.length)
+        found = self.stations[:-1] + nearest
+        squares[np.abs(found - stations[:, None]) > reach] = math.inf
+        rows = np.arange(len(points))
+        return self._refined(points, found[rows, squares.argmin(axis=1)], 0.0, self.length)
 
     def place(self, x: float, y: float, *, between: tuple[float, float]) -> tuple[float, float]:
         """Station and offset of one point, as `project` finds them."""
@@ -115,6 +121,12 @@ class Polyline:
         step = (dx * cosine + dy * sine) / (1.0 - fold) if abs(fold) < _FOLD else 0.0
         refined = min(max(station + step, low), high)
         return refined, math.copysign(math.hypot(*self._gap(x, y, refined)), across)
+
+    def _local(self, xy: Floats) -> Floats:
+        """(m, 3) points relative to the first one of the line, and 1."""
+        local = np.ones((len(xy), 3))
+        np.subtract(xy, self.points[0], out=local[:, :2])
+        return local
 
     def _nearest(self, local: Floats, low: float, high: float) -> tuple[int, Floats, Floats]:
         """First segment searched, and of each one from there the nearest place along it and its squared distance.

@@ -27,6 +27,7 @@ _CORNERS = np.array([(ahead, side) for ahead in (_FRONT, -_REAR) for side in (_H
 _STRAY = 0.15  # [m] a corner beyond the edge of the lane that the line is drawn anew for
 _CLEARANCE = 0.1  # [m] wanted between a corner and the road's edge
 _BETWEEN = 0.25  # [m] points of the line, about
+_PASS = 12.0  # [m] of line within which a point of it is looked for: farther on it may have turned back
 _ABREAST = 0.25  # [m] between the stations that points are told to be abreast of
 _ITERATIONS = 60
 _ENOUGH = 1e-4  # relative gain of a step that is not worth another one
@@ -246,8 +247,8 @@ def _arrival(chain: _Chain, end: Floats) -> _Terms:
 
 
 def _off_line(chain: _Chain, window: _Window) -> _Terms:
-    stations, offsets = window.line.project(chain.points)
-    rows = np.arange(len(offsets))
+    rows = np.arange(len(chain.points))
+    stations, offsets = _projected(chain.points, rows, chain, window)
     return _Terms(_OFF_LINE * offsets, _OFF_LINE * _offset_slopes(chain, window, rows, chain.points, stations))
 
 
@@ -257,7 +258,7 @@ def _off_road(chain: _Chain, window: _Window) -> _Terms:
     axles = np.repeat(chain.points, len(_CORNERS), axis=0)
     ahead, side = _CORNERS.T
     spots = axles + np.stack((ahead * cos - side * sin, ahead * sin + side * cos), axis=-1).reshape(-1, 2)
-    stations, offsets = window.line.project(spots)
+    stations, offsets = _projected(spots, np.arange(len(spots)) // len(_CORNERS), chain, window)
     left, right = (np.interp(stations, window.line.stations, edge) for edge in (window.left, window.right))
     is_left = np.tile(side > 0.0, len(chain.points))
     beyond = np.where(
@@ -266,6 +267,12 @@ def _off_road(chain: _Chain, window: _Window) -> _Terms:
     out = np.flatnonzero((beyond != 0.0) & (stations > 0.0) & (stations < window.line.length))
     slopes = _offset_slopes(chain, window, out // len(_CORNERS), spots[out], stations[out])
     return _Terms(_OFF_ROAD * beyond[out], _OFF_ROAD * slopes)
+
+
+def _projected(spots: Floats, rows: Integers, chain: _Chain, window: _Window) -> tuple[Floats, Floats]:
+    """Stations and offsets of `spots` beside the chain's points `rows`, on the same pass of a turn back."""
+    shares = np.arange(len(chain.points)) / len(chain.turns)
+    return window.line.project_near(spots, window.line.length * shares[rows], _PASS)
 
 
 def _offset_slopes(chain: _Chain, window: _Window, rows: Integers, spots: Floats, stations: Floats) -> Floats:

@@ -113,6 +113,24 @@ def test_turn_back_uses_both_lanes_of_the_road(grid: NetBuilder) -> None:
     assert before.max() < 2.0
 
 
+@pytest.mark.parametrize("kink", [-20.0, 10.0, 20.0])
+def test_before_and_after_a_turn_back_the_line_keeps_off_the_opposite_lane(plain: NetBuilder, kink: float) -> None:
+    """They are side by side: who is on the one is beside the other one, too."""
+    nodes = '<node id="a" x="0" y="0"/><node id="b" x="100" y="0"/>'
+    shape = f"0,0 75,{kink} 100,0"
+    back = f"100,0 75,{kink} 0,0"
+    edges = f"""<edge id="ab" from="a" to="b" speed="13.9" shape="{shape}"/>
+        <edge id="ba" from="b" to="a" speed="13.9" shape="{back}"/>"""
+    net = plain(nodes, edges)
+    route = net.route(["ab", "ba"], "ab_0", 5.0, None, 90.0)
+    driven = (route.line.stations >= route.start) & (route.line.stations <= route.destination)
+    for lane_id in ("ab_0", "ba_0"):
+        lane = net.lanes[lane_id].line
+        rows = [row for row in driven.nonzero()[0].tolist() if route.lane_ids[row] == lane_id]
+        stations, offsets = lane.project(route.line.points[rows])
+        assert offsets[(stations > 8.0) & (stations < lane.length - 8.0)].max() < 0.9
+
+
 def beyond(line: Polyline, drawn: Polyline, half: float) -> float:
     """How far a corner comes beyond a lane so wide on each side of `line` [m]."""
     found = swept(line, drawn)
