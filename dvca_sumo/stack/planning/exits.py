@@ -49,10 +49,9 @@ def is_blocked(
     between the junction and the first one who stands beyond it, after all who drive there before the ego have
     closed up. It is not any more where it could hardly stop.
     """
-    line = view.line
-    if not line.crosses or distance <= 0.0 or speed * speed > 2.0 * _BRAKING * distance:
+    if not view.line.crosses or distance <= 0.0 or speed * speed > 2.0 * _BRAKING * distance:
         return False
-    leave = view.distance + line.exit_station - line.station
+    leave = view.exit_distance
     if (those.stands & ~those.is_vehicle & (those.rears > distance) & (those.rears <= leave)).any():
         return True
     beyond = those.stands & (those.rears > leave)

@@ -34,6 +34,11 @@ class LineView(NamedTuple):
     waiting_distance: float  # [m] from the front bumper to where it is let pass
 
     @property
+    def exit_distance(self) -> float:
+        """From the front bumper to where the junction behind the line ends [m]."""
+        return self.distance + self.line.exit_station - self.line.station
+
+    @property
     def may_wait(self) -> bool:
         """Whether the ego has not yet passed that place, or is still at it."""
         return self.waiting_distance > -_AT_PLACE

@@ -152,7 +152,7 @@ def _before_blocked(
 def _closing_up(usual: float, views: list[LineView], shape: VehicleShape, config: PlanningConfig) -> float:
     """How much further than at a `usual` place the front bumper stops, so that the rear one is off a junction [m]."""
     for view in views:
-        left = view.distance + view.line.exit_station - view.line.station - (usual - shape.length)
+        left = view.exit_distance - (usual - shape.length)
         if view.line.crosses and 0.0 < left <= config.object_gap - config.follow_gap:
             return left
     return 0.0

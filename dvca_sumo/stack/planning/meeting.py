@@ -189,7 +189,6 @@ class Meetings:
                 nearest = touching  # it passes close beside the ego, then touches it further on
         at = nearest - gap - front
         for view in views:
-            leave = view.distance + view.line.exit_station - view.line.station
-            if view.distance - 1.0 <= nearest - front <= leave and view.may_wait:
+            if view.distance - 1.0 <= nearest - front <= view.exit_distance and view.may_wait:
                 at = min(at, view.waiting_distance)
         return Stop(at, nearest - HARD_GAP - front - at, f"yield {graph.track(row)}", until)
