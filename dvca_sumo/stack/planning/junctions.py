@@ -151,8 +151,12 @@ class Junctions:
 
 
 def _gap(line: StopLine, crossings: Sequence[Crossing], config: PlanningConfig) -> float:
-    """What is kept before a line, of which a pedestrian crossing may begin close behind [m]."""
-    behind = [crossing.start_station - line.station for crossing in crossings if crossing.end_station > line.station]
+    """What is kept before a line, behind which a pedestrian crossing may begin [m].
+
+    Never more than before one that begins at the line: farther away, standing would not count as having stopped at it.
+    """
+    ahead = (crossing for crossing in crossings if crossing.end_station > line.station)
+    behind = (max(crossing.start_station - line.station, 0.0) for crossing in ahead)
     return max(config.stop_line_gap, config.crossing_gap - min(behind, default=config.crossing_gap))
 
 

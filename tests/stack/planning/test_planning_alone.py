@@ -93,7 +93,10 @@ def test_red_light_is_stopped_at_before_the_line() -> None:
     assert_drivable(driven)
 
 
-@pytest.mark.parametrize(("crossing", "kept"), [((120.0, 124.0), 1.5), ((120.5, 124.5), 1.0), ((123.0, 127.0), 0.8)])
+@pytest.mark.parametrize(
+    ("crossing", "kept"),
+    [((120.0, 124.0), 1.5), ((120.5, 124.5), 1.0), ((123.0, 127.0), 0.8), ((116.0, 124.0), 1.5), ((112.0, 118.0), 0.8)],
+)
 def test_room_is_left_to_people_on_a_crossing_behind_the_line(crossing: tuple[float, float], kept: float) -> None:
     route = road(stop_lines=[stop_line(120.0, Control.SIGNAL)], crossings=[Crossing("c", *crossing)])
     driven = drive(route, 20.0, speed=13.0, signals=lambda _: {"J/2": SignalColour.RED})
