@@ -150,6 +150,15 @@ def test_a_body_that_turns_on_the_spot_beside_the_nose_swings_its_tail_into_the_
     assert disturbances([turned(0.0, -0.6), turned(0.1, math.pi - 0.5)], roads) == [("car", "jumped")]
 
 
+@pytest.mark.parametrize(("aside", "expected"), [(0.6, [("person:p", "jumped")]), (0.3, [])])
+def test_a_person_who_is_set_down_in_the_way_is_the_simulators_doing_and_one_who_steps_aside_is_not(
+    roads: RoadMap, aside: float, expected: list[tuple[str, str]]
+) -> None:
+    beside, into = (("person:p", (52.0, LANE_Y - 1.4 + way), 0.0) for way in (0.0, aside))
+    moments = [moment(0.0, 50.0, 5.0, [beside]), moment(0.1, 50.5, 5.0, [into])]
+    assert disturbances([on_foot(one) for one in moments], roads) == expected
+
+
 @pytest.mark.parametrize(("beside", "expected"), [(0.5, [("person:p", "appeared")]), (1.0, [])])
 def test_a_person_who_appears_a_step_beside_the_ego_is_the_simulators_doing(
     roads: RoadMap, beside: float, expected: list[tuple[str, str]]
