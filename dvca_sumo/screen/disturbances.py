@@ -21,7 +21,7 @@ from dvca_sumo.oracles.ahead import ahead
 from dvca_sumo.truth import Moment, ObjectsTruth
 
 IN_SIGHT = 120.0  # [m] of a body that comes nearer on its own way, it was seen before
-LEAP = 1.0  # [m] in one step, beyond what the greater of its speeds before and after allows ...
+LEAP = 1.0  # [m] in one step, beyond what its speed before allows ...
 ASIDE = 0.4  # [m] ... and of people: SUMO has them step aside by up to 0.35 m
 REACTION = 0.5  # [s]
 BRAKING = 8.0  # [m/s^2]
@@ -157,10 +157,8 @@ def _lengthened(box: Floats, by: float) -> Floats:
 def _leaps(now: ObjectsTruth, rows: Integers, before: ObjectsTruth, rows_before: Integers) -> Integers:
     """Where among `rows` bodies are that went farther than they can; (k,) each."""
     passed = now.time - before.time
-    speeds = np.maximum(
-        np.hypot(now.velocities[rows, 0], now.velocities[rows, 1]),
-        np.hypot(before.velocities[rows_before, 0], before.velocities[rows_before, 1]),
-    )
+    # Not its speed now: that is the one at which it was moved.
+    speeds = np.hypot(before.velocities[rows_before, 0], before.velocities[rows_before, 1])
     moved = _ends(now)[:, rows] - _ends(before)[:, rows_before]
     farthest = np.hypot(moved[:, :, 0], moved[:, :, 1]).max(axis=0)
     leaps = np.where(now.classes[rows] == _PERSON, ASIDE, LEAP)

@@ -1,22 +1,26 @@
 """Whose doing a violation is, by written rules.
 
 1. The simulator's: see `disturbances`.
-2. The other one's: it ran into the standing ego; it ran into the rear of the ego while that was in its lane; it
-   touched the flank of an ego that was in its lane and not on a junction. Then time to collision and distance to that
-   same object just before are its doing, too. And a destination is not reached for the others' sake when SUMO's own
-   driver on the same trip had not arrived after the same time either, or when it ends in a jam: see `jams`.
+2. The other one's: it ran into the standing ego; it ran into the rear of the ego while that was in its lane, or while
+   the ego was on its way out of the other one's lane; it touched the flank of an ego that was in its lane and not on a
+   junction. Then time to collision and distance to that same object just before are its doing, too. And a destination
+   is not reached for the others' sake when SUMO's own driver on the same trip had not arrived after the same time
+   either, or when it ends in a jam: see `jams`.
 3. Everything else is the driver's: the ego's own. Traffic rules are always the driver's.
 
 The ego, or its rear, is in its lane when no corner is more than 0.3 m beyond the edges of the lane under its middle.
-In sharp turns the front sweeps out further.
+In sharp turns the front sweeps out further. The ego is on its way out of a lane, off the junctions, when its rear is
+partly on it and its heading leads away from the middle. SUMO's drivers follow who is on their lane with its middle.
 """
 
 import enum
+import math
 from collections.abc import Sequence
 
 import msgspec
 import numpy as np
 
+from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.boxes import box_of, corners
 from dvca_sumo.messages import Floats
 from dvca_sumo.oracles.destination import Destination
@@ -28,6 +32,7 @@ from dvca_sumo.violations import Contact, Judgement, Violation
 _TOLERANCE = 0.3  # [m] as of the oracle of the lane
 _NEAR = 3.0  # [m] from its middle a lane is under the ego
 _REAR = slice(1, 3)  # of the corners of a box
+_AWAY = 0.05  # [rad] of heading from the middle of a lane, at least
 _BEFORE = 5.0  # [s] before a contact what is about the same object belongs to it
 
 
@@ -95,7 +100,9 @@ def _excuse(contact: Violation, moment: Moment, roadmap: RoadMap) -> str:
     box = box_of(ego.x, ego.y, ego.heading, moment.shape)
     spots = corners(box[None])[0]
     if contact.contact is Contact.HIT_FROM_BEHIND:
-        return "ran into the ego from behind" if _lane_kept(spots[_REAR], box, roadmap) is not None else ""
+        other = moment.objects.boxes[moment.objects.ids.index(contact.object or "")]
+        is_clear = _lane_kept(spots[_REAR], box, roadmap) is not None or _leaves(spots[_REAR], box, other, roadmap)
+        return "ran into the ego from behind" if is_clear else ""
     lane = _lane_kept(spots, box, roadmap)
     return "touched the ego in its lane" if lane is not None and not lane.is_internal else ""
 
@@ -109,3 +116,14 @@ def _lane_kept(spots: Floats, box: Floats, roadmap: RoadMap) -> Lane | None:
         if float(np.abs(offsets).max()) <= 0.5 * lane.width + _TOLERANCE:
             return lane
     return None
+
+
+def _leaves(rear: Floats, box: Floats, other: Floats, roadmap: RoadMap) -> bool:
+    """Whether the ego's `box` (5,), its `rear` corners (2, 2), is on its way out of the lane under the `other` (5,)."""
+    near = roadmap.lanes_near(other[None, :2], _NEAR)[0]
+    if not near or roadmap.lanes[near[0]].is_internal:
+        return False
+    lane = roadmap.lanes[near[0]]
+    stations, offsets = lane.line.project(rear)
+    away = math.copysign(1.0, offsets.sum()) * wrapped(box[2] - float(lane.line.poses(stations)[0, 2]))
+    return bool(np.abs(offsets).min() < 0.5 * lane.width and _AWAY < away < 0.5 * math.pi)

@@ -105,6 +105,13 @@ def test_a_body_that_jumps_into_the_way_is_and_one_that_drives_there_is_not(road
     assert disturbances(slowly, roads) == []
 
 
+def test_a_body_that_jumps_is_told_by_its_speed_before_not_by_that_of_the_jump(roads: RoadMap) -> None:
+    """Bodies have the speed at which they are moved: a jump is as fast as it is far."""
+    rows: list[Row] = [("car", (58.0, LANE_Y + 3.5), 10.0), ("car", (60.0, LANE_Y + 1.9), 20.0)]
+    jump = [moment(0.1 * k, 60.0 + 2.5 * k, 25.0, [row]) for k, row in enumerate(rows)]
+    assert disturbances(jump, roads) == [("car", "jumped")]
+
+
 def test_a_body_that_turns_on_the_spot_sweeps_over_the_road_at_no_speed_of_its_own(roads: RoadMap) -> None:
     """Its front hardly moves: its rear leaps into the way."""
 
@@ -227,6 +234,17 @@ def test_being_run_into_from_behind_is_the_others_unless_the_ego_left_its_lane(r
     assert at_contact(hit(LANE_Y + 1.6), roads) == [("collision", Fault.DRIVER)]
     aslant = [msgspec.structs.replace(one, ego=msgspec.structs.replace(one.ego, heading=0.4)) for one in hit(LANE_Y)]
     assert at_contact(aslant, roads) == [("collision", Fault.OTHER)]  # its front has swept out, its rear is in the lane
+
+
+@pytest.mark.parametrize(("heading", "fault"), [(0.2, Fault.OTHER), (0.0, Fault.DRIVER), (-0.2, Fault.DRIVER)])
+def test_being_run_into_on_the_way_out_of_a_lane_is_the_others_and_on_the_way_in_the_drivers(
+    roads: RoadMap, heading: float, fault: Fault
+) -> None:
+    """The ego lies across the marking: whose lane that of the other is depends on where it goes."""
+    tail = [("tail", (40.0 + 1.5 * k, LANE_Y), 15.0) for k in range(15)]
+    moments = [moment(0.1 * k, 60.0 + 0.5 * k, 5.0, [row], y=LANE_Y + 1.6) for k, row in enumerate(tail)]
+    aslant = [msgspec.structs.replace(one, ego=msgspec.structs.replace(one.ego, heading=heading)) for one in moments]
+    assert at_contact(aslant, roads) == [("collision", fault)]
 
 
 def test_a_standing_ego_is_never_at_fault(roads: RoadMap) -> None:
