@@ -126,13 +126,14 @@ class NudgeDecider:
         for offset in wanted:
             stays_in_lane = offset == 0.0 or (room.is_in_lane(offset) and not turns_in)
             if stays_in_lane or self._may_leave_lane(blocker, offset, begun, situation):
-                if abs(offset - held) < hold and self._clears(blocker, held):
+                beside = self._sparing(blocker, offset, situation) if stays_in_lane else offset
+                if abs(beside - held) < hold and self._clears(blocker, held):
                     yield held
-                yield offset
+                yield beside
         has_lane = room.lane_right <= room.lane_left and not turns_in
         if has_lane and (blocker.walks or self._will_stay(blocker, situation)):
             inside = (min(max(offset, room.lane_right), room.lane_left) for offset in wanted)
-            yield from (offset for offset in inside if self._clears(blocker, offset))
+            yield from (self._sparing(blocker, offset, situation) for offset in inside if self._clears(blocker, offset))
         for offset in wanted:
             if not self._meets_another(blocker, offset, situation.scene):
                 tight = tightened(blocker, offset, self._config)
@@ -167,11 +168,7 @@ class NudgeDecider:
             and (blocker.track not in self._since or situation.lateral.offset / offset > _COMMITTED)
         ):
             return True
-        if not self._will_stay(blocker, situation):
-            return False
-        length = blend_length(offset, situation.speed, self._config)
-        band = (blocker.low - self._shape.front - length, blocker.high + length)
-        return self._is_free(offset, band, situation)
+        return self._will_stay(blocker, situation) and self._is_free(blocker, offset, situation)
 
     def _will_stay(self, blocker: Blocker, situation: Situation) -> bool:
         """Whether it has stood for so long, where it is, that it will not move by itself."""
@@ -239,20 +236,31 @@ class NudgeDecider:
                 return True
         return False
 
-    def _is_free(self, offset: float, band: tuple[float, float], situation: Situation) -> bool:
+    def _is_free(self, blocker: Blocker, offset: float, situation: Situation) -> bool:
         """Whether nobody who moves comes alongside while the ego is out of its lane; who is right behind it follows."""
+        scene, now = situation.scene, situation.scene.now
+        beside = self._alongside(blocker, offset, self._config.object_margin, situation)
+        follows = (now.stations < 0.0) & (np.abs(now.offsets - situation.lateral.offset) < now.half_widths + self._half)
+        return not bool(beside[~follows[scene.owners[: scene.moving]]].any())
+
+    def _sparing(self, blocker: Blocker, offset: float, situation: Situation) -> float:
+        """The offset within the lane, or a smaller one: who moves on that side is to have as much room as the ego."""
+        scene, least = situation.scene, self._config.nudge_clearance_least
+        is_beyond = (scene.futures.offsets[: scene.moving, 0] - offset) * offset > 0.0
+        is_needed = bool((is_beyond & self._alongside(blocker, offset, least, situation)).any())
+        return tightened(blocker, offset, self._config) if is_needed else offset
+
+    def _alongside(self, blocker: Blocker, offset: float, margin: float, situation: Situation) -> Flags:
+        """Which futures that move (moving,) come alongside, within `margin` [m], while the ego is at that offset."""
         scene = situation.scene
-        if not scene.moving:
-            return True
-        futures, moving, now = scene.futures, slice(0, scene.moving), scene.now
-        pace = max(situation.speed, SLOWEST)
+        futures, moving = scene.futures, slice(0, scene.moving)
+        pace, length = max(situation.speed, SLOWEST), blend_length(offset, situation.speed, self._config)
         ego: Floats = pace * scene.times
-        out: Flags = (ego > band[0]) & (ego < band[1])
+        out: Flags = (ego > blocker.low - self._shape.front - length) & (ego < blocker.high + length)
         stations, lengths = futures.stations[moving], futures.half_lengths[moving]
-        room = self._half + self._config.object_margin
-        beside = np.abs(futures.offsets[moving] - offset) < futures.half_widths[moving] + room
+        beside = np.abs(futures.offsets[moving] - offset) < futures.half_widths[moving] + self._half + margin
         rates = (stations[:, -1:] - stations[:, :1]) / (scene.times[-1] - scene.times[0])
         behind = self._shape.rear_overhang + _BAND_GAP + _CLOSING * np.maximum(rates - pace, 0.0)
         beside &= (stations + lengths > ego - behind) & (stations - lengths < ego + self._shape.front + _BAND_GAP)
-        follows = (now.stations < 0.0) & (np.abs(now.offsets - situation.lateral.offset) < now.half_widths + self._half)
-        return not bool((beside & out)[~follows[scene.owners[moving]]].any())
+        found: Flags = np.any(beside & out, axis=1)
+        return found

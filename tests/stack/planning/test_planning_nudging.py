@@ -136,6 +136,17 @@ def test_person_is_passed_within_the_lane_where_the_next_one_is_not_free() -> No
     assert driven.clearances.min() > 0.35
 
 
+@pytest.mark.parametrize(("heading", "begin"), [(math.pi, 130.0), (0.0, -380.0)])
+def test_who_comes_by_close_to_the_lane_is_left_as_much_room_as_who_stands_at_its_other_edge(
+    heading: float, begin: float
+) -> None:
+    """Within its lane, too, the ego does not move towards others for a wider berth than it needs."""
+    busy = [car(10 + i, begin + 12.0 * i, 2.6, heading=heading, speed=12.0) for i in range(40)]
+    driven = drive(road(lanes_left=1), 25.0, speed=8.0, actors=[person(5, 117.0, -1.4), *busy])
+    assert driven.fronts[-1] > 130.0
+    assert driven.clearances.min() > 0.35
+
+
 def test_where_the_next_lane_is_busy_the_ego_passes_closer_and_keeps_off_it() -> None:
     busy = [car(10 + i, 200.0 + 12.0 * i, 3.3, heading=math.pi, speed=8.0) for i in range(40)]
     driven = drive(road(lanes_left=1), 30.0, speed=8.0, actors=[person(5, 117.0, -0.6), *busy])
