@@ -56,7 +56,7 @@ class Disturbances:
         self._places = places
         self._before: ObjectsTruth | None = None
         self._rows: dict[str, int] = {}  # by name, in the moment before
-        self._sudden: dict[str, Disturbance] = {}  # by name, the last time it appeared or jumped, however far away
+        self._sudden: dict[str, list[Disturbance]] = {}  # by name, when it appeared or jumped, however far away
         self._drove = -math.inf  # [s] when the ego last moved
         self._waited: dict[str, float] = {}  # [s] by person, when they last stood beside the ego
 
@@ -76,7 +76,8 @@ class Disturbances:
                 _leaps(objects, now, before, np.array([self._rows[name] for name in common], dtype=np.int64))
             ].tolist()
         for how, candidates in (("appeared", appeared), ("jumped", jumped)):
-            self._sudden.update((names[row], Disturbance(moment.time, names[row], how)) for row in candidates)
+            for name in (names[row] for row in candidates):
+                self._sudden.setdefault(name, []).append(Disturbance(moment.time, name, how))
             for row in self._too_near(moment, candidates):
                 self.found.append(Disturbance(moment.time, names[row], how))
         if abs(moment.ego.speed) >= _STANDING:
@@ -86,9 +87,9 @@ class Disturbances:
 
     def explain(self, name: str | None, time: float) -> Disturbance | None:
         """The disturbance by that body that a violation at `time` [s] comes from."""
-        sudden = self._sudden.get(name or "")
-        if sudden is not None and 0.0 <= time - sudden.time <= REACTION:
-            return sudden
+        for sudden in reversed(self._sudden.get(name or "", [])):
+            if 0.0 <= time - sudden.time <= REACTION:
+                return sudden
         return next((one for one in self.found if one.object == name and one.lasts(time)), None)
 
     def _too_near(self, moment: Moment, rows: list[int]) -> list[int]:

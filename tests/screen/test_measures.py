@@ -144,6 +144,15 @@ def test_a_body_that_jumps_and_touches_the_ego_before_anybody_reacts_is_the_simu
     assert at_contact(moments, roads)[-1] == ("collision", fault)
 
 
+def test_what_a_jump_brings_about_is_the_simulators_doing_though_the_body_jumps_again_later(roads: RoadMap) -> None:
+    watch = Disturbances(places(roads))
+    for k in range(9):
+        aside = 3.0 * (k >= 4) - 3.0 * (k >= 7)
+        watch.see(moment(0.1 * k, 50.0 + 2.5 * k, 25.0, [("car", (90.0 + 1.6 * k, LANE_Y + 6.0 - aside), 16.0)]))
+    explained = [watch.explain("car", time) for time in (0.45, 0.75)]
+    assert [(one.how, round(one.time, 1)) for one in explained if one] == [("jumped", 0.4), ("jumped", 0.7)]
+
+
 def test_a_body_that_turns_on_the_spot_beside_the_nose_swings_its_tail_into_the_way(roads: RoadMap) -> None:
     """Its nose stays beside the ego's: along the way, it is not ahead."""
 
