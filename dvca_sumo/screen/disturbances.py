@@ -19,10 +19,10 @@ from dvca_sumo.messages import Floats, Integers, ObjectClass
 from dvca_sumo.oracles import Places
 from dvca_sumo.oracles.ahead import ahead
 from dvca_sumo.truth import Moment, ObjectsTruth
+from dvca_sumo.world.crowd import ASIDE
 
 IN_SIGHT = 120.0  # [m] of a body that comes nearer on its own way, it was seen before
-LEAP = 1.0  # [m] in one step, beyond what its speed before allows ...
-ASIDE = 0.4  # [m] ... and of people: SUMO has them step aside by up to 0.35 m
+LEAP = 1.0  # [m] in one step, beyond what its speed before allows; of people `ASIDE`
 REACTION = 0.5  # [s]
 BRAKING = 8.0  # [m/s^2]
 TOUCHING = 0.2  # [m]

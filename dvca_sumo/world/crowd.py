@@ -5,14 +5,13 @@ from collections.abc import Mapping, Sequence
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from dvca_sumo.messages import Floats, Integers, ObjectClass
 from dvca_sumo.truth import ObjectsTruth
 
 _STRETCH = 2.0  # times as long as SUMO takes a lane to be it may be drawn
 _LEAP = 1.0  # [m] in one step, beyond what the stretched speed allows: set down elsewhere, not driven there
-_ASIDE = 0.4  # [m] and of people, beyond what their speed allows: SUMO has them step aside by up to 0.35 m
+ASIDE = 0.4  # [m] and of people, beyond what their speed allows: SUMO has them step aside by up to 0.35 m
 _PERSON = int(ObjectClass.PEDESTRIAN)
 
 
@@ -35,7 +34,6 @@ class Crowd:
     def __init__(self) -> None:
         self._ids: tuple[str, ...] = ()
         self._classes: Integers = np.empty(0, dtype=np.int64)
-        self._walks: npt.NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
         self._sizes: Floats = np.empty((0, 3))  # length, width, reach
         self._time = math.nan
         self._centres: Floats = np.empty((0, 2))  # where they were last, nan for those who were not here
@@ -76,7 +74,7 @@ class Crowd:
         passed, moved = time - self._time, centres - self._centres
         self._time, self._centres = time, centres
         way = told * passed
-        farthest = np.where(self._walks, way + _ASIDE, _STRETCH * way + _LEAP)
+        farthest = np.where(self._classes == _PERSON, way + ASIDE, _STRETCH * way + _LEAP)
         has_driven = np.hypot(moved[:, 0], moved[:, 1]) <= farthest  # not where any is nan
         speeds: Floats = np.where(has_driven, (moved * ahead).sum(axis=1) / passed, told)
         return speeds
@@ -87,6 +85,5 @@ class Crowd:
         self._ids = names
         self._classes = np.array([body.kind for body in bodies], dtype=np.int64)
         self._classes.setflags(write=False)  # one array for many moments
-        self._walks = self._classes == _PERSON
         sizes = [(body.length, body.width, body.reach) for body in bodies]
         self._sizes = np.array(sizes, dtype=np.float64).reshape(-1, 3)

@@ -247,8 +247,9 @@ class NudgeDecider:
         """The offset within the lane, or a smaller one: who moves on that side is to have as much room as the ego."""
         scene, least = situation.scene, self._config.nudge_clearance_least
         is_beyond = (scene.futures.offsets[: scene.moving, 0] - offset) * offset > 0.0
-        is_needed = bool((is_beyond & self._alongside(blocker, offset, least, situation)).any())
-        return tightened(blocker, offset, self._config) if is_needed else offset
+        if is_beyond.any() and (is_beyond & self._alongside(blocker, offset, least, situation)).any():
+            return tightened(blocker, offset, self._config)
+        return offset
 
     def _alongside(self, blocker: Blocker, offset: float, margin: float, situation: Situation) -> Flags:
         """Which futures that move (moving,) come alongside, within `margin` [m], while the ego is at that offset."""
