@@ -19,7 +19,7 @@ from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.continuations import Continuations
 
 _X, _Y, _HEADING = range(3)  # columns of poses
-_BEND_SPEED, _LIMIT, _HALF_WIDTH = range(3)  # rows of rules
+_BEND_SPEED, _LIMIT, _HALF_WIDTH, _TURNED = range(4)  # rows of rules
 
 _TAIL = 300  # [m] beyond a dead end or the net's edge, traffic is taken to go straight on
 _LENGTH_STEP = 40.0  # [m] continuations are kept by length in such steps
@@ -64,7 +64,7 @@ class LanePaths:
         self._lateral_acceleration = lateral_acceleration
         self._braking = braking
         self._poses = np.empty((4096, 3))
-        self._rules = np.empty((3, 4096))
+        self._rules = np.empty((4, 4096))
         self._used = 0
         self._paths: dict[tuple[str, ...], LanePath] = {}
         self._branches: dict[tuple[str, int], tuple[tuple[LanePath, float], ...]] = {}
@@ -103,6 +103,13 @@ class LanePaths:
         rows = np.maximum(np.rint(stations).astype(np.int64), 0)[:, None] + np.arange(count)
         rows = np.minimum(rows, last[:, None]) + first[:, None]
         return self._rules[_BEND_SPEED].take(rows), self._rules[_LIMIT].take(rows)
+
+    def turned(self, paths: Sequence[LanePath], starts: Floats, ends: Floats) -> Floats:
+        """How far each path turns, either way, from station to station [rad]: (h,), of (h,) and (h,)."""
+        first, last = _extents(paths)
+        begin, end = (np.minimum(np.maximum(np.rint(at).astype(np.int64), 0), last) for at in (starts, ends))
+        turned: Floats = self._rules[_TURNED].take(end + first) - self._rules[_TURNED].take(begin + first)
+        return turned
 
     def poses(self, paths: Sequence[LanePath], stations: Floats, offsets: Floats) -> Floats:
         """Poses at `stations` (h, t), moved to the left by `offsets` (h, t): (h, t, 3), headings not wrapped."""
@@ -145,6 +152,7 @@ class LanePaths:
                 self._bend_speeds(poses[:, _HEADING]),
                 np.array([part.speed_limit for part in parts])[which],
                 np.array([part.width / 2.0 for part in parts])[which],
+                np.concatenate(([0.0], np.abs(np.diff(poses[:, _HEADING])).cumsum())),
             ]
         )
         return LanePath(lanes, tuple(starts.tolist()), self._stored(poses, rules), len(poses))
@@ -165,7 +173,7 @@ class LanePaths:
         if self._used > len(self._poses):
             more = 2 * self._used - first
             self._poses = np.concatenate([self._poses[:first], np.empty((more, 3))])
-            self._rules = np.concatenate([self._rules[:, :first], np.empty((3, more))], axis=1)
+            self._rules = np.concatenate([self._rules[:, :first], np.empty((4, more))], axis=1)
         self._poses[first : self._used] = poses
         self._rules[:, first : self._used] = rules
         return first

@@ -20,7 +20,7 @@ from dvca_sumo.stack.lane_motion import LaneMotion, MotionModelConfig
 from dvca_sumo.stack.lane_paths import LanePath, LanePaths
 from dvca_sumo.stack.walking import Walking, WalkingConfig
 
-_LONG = 7.0  # [m] longer bodies (buses, lorries) cut the corners of their lanes noticeably
+_CUTS = 0.1  # [m] by which a body has to cut a corner of its lane for that to be told
 # Comparing an array with an enumeration's member costs numpy ten times as much as with a number.
 _VEHICLE, _BICYCLE, _PERSON = int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 
@@ -131,16 +131,17 @@ class MapPrediction:
         is_bicycle = tracked.classes[owners] == _BICYCLE
         keeps_side = is_bicycle & (np.abs(places.offsets) <= places.half_widths)
         lengths = tracked.boxes[owners, 3]
-        long = (lengths > _LONG).nonzero()[0]
-        long_paths, beside = [paths[row] for row in long.tolist()], places.offsets
-        if long_paths:
+        turned = self._paths.turned(paths, places.stations - 0.5 * lengths, stations[:, -1] + 0.5 * lengths)
+        bent = (turned * lengths > 8.0 * _CUTS).nonzero()[0]  # an arc's height over its chord is length * angle / 8
+        bent_paths, beside = [paths[row] for row in bent.tolist()], places.offsets
+        if bent_paths:
             beside = beside.copy()
-            beside[long] -= self._cut(long_paths, places.stations[long], lengths[long])
+            beside[bent] -= self._cut(bent_paths, places.stations[bent], lengths[bent])
         targets = np.where(keeps_side, beside, 0.0)
         offsets, slants = self._motion.settled(beside, targets, drifts, own)
         poses = self._paths.poses(paths, stations, offsets)
-        if long_paths:
-            poses[long] = self._paths.bodies(long_paths, stations[long], offsets[long], lengths[long])
+        if bent_paths:
+            poses[bent] = self._paths.bodies(bent_paths, stations[bent], offsets[bent], lengths[bent])
         poses[:, :, 2] = wrapped_all(poses[:, :, 2] + slants)
         poses[:, 0] = tracked.boxes[owners, :3]
         ends = zip(paths, stations[:, 0].tolist(), stations[:, -1].tolist(), strict=True)
@@ -148,7 +149,7 @@ class MapPrediction:
         return _told_apart(Hypotheses(owners, probabilities, poses, lanes))
 
     def _cut(self, paths: list[LanePath], stations: Floats, lengths: Floats) -> Floats:
-        """How far to the left of its path the middle of a long body is where its ends are on it (h,) [m]."""
+        """How far to the left of its path the middle of a body is where its ends are on it (h,) [m]."""
         here, none = stations[:, None], np.zeros((len(stations), 1))
         on_path = self._paths.poses(paths, here, none)[:, 0]
         gaps = self._paths.bodies(paths, here, none, lengths)[:, 0] - on_path

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import sumolib
 
+from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import PREDICTION_TIMES, Floats, ObjectClass, PredictedObjects, TrackedObjects
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.prediction import MapPrediction, PredictionConfig
@@ -130,6 +131,17 @@ def test_both_ends_of_a_bus_follow_its_lane_and_its_middle_cuts_the_bend(roadmap
         assert np.abs(line.project(end)[1]).max() < 0.1
     _, cuts = line.project(poses[:3, :2])
     assert cuts == pytest.approx(12.0**2 / (8.0 * RADIUS), abs=0.1)
+
+
+def test_both_ends_of_a_car_follow_a_sharp_turn_that_its_middle_cuts(roadmap: RoadMap) -> None:
+    result = predicted(roadmap, Seen(-20.0, RIGHT, speed=6.0))
+    (right,) = ends(result, "right_0")
+    line = Polyline(np.concatenate([roadmap.lanes[lane].line.points for lane in result.lanes[right]]))
+    poses = result.poses[right]
+    ways = 0.5 * 4.5 * np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=1)
+    front, middle, rear = (np.abs(line.project(poses[:, :2] + end)[1]).max() for end in (ways, 0.0, -ways))
+    assert max(front, rear) < 0.1
+    assert middle > 0.3
 
 
 def test_at_a_fork_every_way_is_a_hypothesis_and_straight_on_the_likeliest(roadmap: RoadMap) -> None:
