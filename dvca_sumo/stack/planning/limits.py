@@ -1,13 +1,13 @@
 """What bounds the speed whoever has the right of way: limits, curves, narrow gaps, and places to stop at."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from dvca_sumo.geometry.boxes import corners
 from dvca_sumo.messages import Floats, Integers, ObjectClass, VehicleShape
-from dvca_sumo.roadmap.route import Control
+from dvca_sumo.roadmap.route import Control, Crossing
 from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.exits import Ahead, ahead, is_blocked
@@ -15,7 +15,7 @@ from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.reference import BEHIND
 from dvca_sumo.stack.planning.scene import ALONG, Flags
 from dvca_sumo.stack.planning.speed import Stop, slowed_before
-from dvca_sumo.stack.planning.st_graph import Graph
+from dvca_sumo.stack.planning.st_graph import AT_CROSSING, Graph
 
 _PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
 _PRIORITY = Control.PRIORITY
@@ -31,17 +31,26 @@ _SLOW_MOVER = 3.0  # [m/s] faster ones are not passed slowly
 _BEFORE_WAITING = 3.0  # [m/s] in front of who has priority and stands ...
 _NOSE = 6.0  # ... so near to the ego's way [m] ...
 _ROOM_TO_STOP = 3.0  # ... and as far before it, should it set off [m]
+_AT_KERB = 1.5  # [m/s] before people who stand at the kerb of a crossing and may set off with the ego ...
+_OUTLOOK = 6.0  # ... so far before them [m]; ...
+_UNHURRIED = 4.0  # ... [m/s] who is faster they let pass
 _OCCUPIED = "stop exit occupied"
 _HERE = 0.1  # [m] is as near to a place as being at it
 _GIVE_AT_DESTINATION = 1.0  # [m]
 _GIVE_AT_OBJECT = 1.0  # [m] of the distance to it is never spent
 
 
-def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config: PlanningConfig) -> list[float]:
-    """Highest speed by metre of path [m/s]: limit, curves, how fast the wheels turn, passing close by, lines of others.
+def speed_caps(
+    speed: float,
+    graph: Graph,
+    views: list[LineView],
+    crossings: Sequence[Crossing],
+    shape: VehicleShape,
+    config: PlanningConfig,
+) -> list[float]:
+    """Highest speed by metre of path [m/s]: limit, curves, how fast the wheels turn, and whom the ego comes close to.
 
-    Close by is also the nose of who may set off. Each is braked for in comfort beforehand. Past such a line the ego
-    feels its way until it sees by who waits beside: it looks from the middle of its body.
+    Each is braked for in comfort beforehand. `speed` is the ego's [m/s].
     """
     path = graph.path
     caps = np.minimum(
@@ -52,26 +61,43 @@ def speed_caps(graph: Graph, views: list[LineView], shape: VehicleShape, config:
     turning = config.steering_rate * _STEERED / (shape.wheelbase * np.maximum(changes, 1e-4))
     middle = slice(_STEERED // 2, _STEERED // 2 + len(turning))
     caps[middle] = np.minimum(caps[middle], turning)
-    passed = _passing_speeds(graph, config)
-    passed += [(row, _BEFORE_WAITING, _ROOM_TO_STOP) for row in _waiting(graph, views)]
-    for row, cap, room in passed:
-        low, high = graph.low[row, 0] - shape.front - room, graph.high[row, 0] + shape.rear_overhang
-        if high > 0.0:
-            part = slice(max(int(low), 0), int(high) + 1)
+    for begin, end, cap in _slow_stretches(speed, graph, views, crossings, shape, config):
+        if end > 0.0:
+            part = slice(max(int(begin), 0), int(end) + 1)
             caps[part] = np.minimum(caps[part], cap)
+    slowed: list[float] = slowed_before(caps, path.arcs, config.slowing).tolist()
+    return slowed
+
+
+def _slow_stretches(
+    speed: float,
+    graph: Graph,
+    views: list[LineView],
+    crossings: Sequence[Crossing],
+    shape: VehicleShape,
+    config: PlanningConfig,
+) -> Iterator[tuple[float, float, float]]:
+    """From where to where along the path somebody is near or may come [m], and the highest speed there [m/s].
+
+    Near is also the nose of who may set off. Past a line of others the ego feels its way until it sees by who waits
+    beside: it looks from the middle of its body.
+    """
+    front, rear = graph.low[:, 0] - shape.front, graph.high[:, 0] + shape.rear_overhang
+    for row, cap, room in _passing_speeds(graph, config):
+        yield front[row] - room, rear[row], cap
+    for row in _waiting(graph, views):
+        yield front[row] - _ROOM_TO_STOP, rear[row], _BEFORE_WAITING
+    if speed < _UNHURRIED:
+        for row in _at_kerbs(graph, views, crossings, config):
+            yield front[row] - _OUTLOOK, graph.high[row, 0] - shape.front, _AT_KERB
     for view in views:
         distance = view.distance
         if not view.goes_first or view.line.control is _PRIORITY:
             continue
         if distance > 0.0:
-            part = slice(int(distance), int(distance) + 2)
-            caps[part] = np.minimum(caps[part], config.give_way_speed)
+            yield distance, distance + 1.0, config.give_way_speed
         abreast = _hiding(graph, shape.front + distance) - shape.centre
-        if abreast > 0.0:
-            part = slice(max(int(min(distance, abreast)), 0), int(abreast) + 1)
-            caps[part] = np.minimum(caps[part], config.peering_speed)
-    slowed: list[float] = slowed_before(caps, path.arcs, config.slowing).tolist()
-    return slowed
+        yield min(distance, abreast), abreast, config.peering_speed
 
 
 def cruise_speeds(limits: Floats, config: PlanningConfig) -> Floats:
@@ -95,6 +121,31 @@ def _waiting(graph: Graph, views: list[LineView]) -> list[int]:
     points_at = np.abs(noses) < np.abs(futures.offsets[rows, 0])
     waits = (gaps > 0.0) & (gaps < _NOSE) & points_at & (np.abs(futures.directions[rows, 0]) < ALONG)
     return [row for row, is_one in zip(rows, waits.tolist(), strict=True) if is_one]
+
+
+def _at_kerbs(graph: Graph, views: list[LineView], crossings: Sequence[Crossing], config: PlanningConfig) -> list[int]:
+    """People who stand beside a crossing ahead, and may use it at any time: not while a signal has them wait.
+
+    As rows of the graph.
+    """
+    scene, still = graph.scene, slice(graph.scene.moving, None)
+    stands = scene.classes[scene.owners[still]] == _PERSON
+    stands &= (graph.gaps[still, 0] > 0.0) & (graph.gaps[still, 0] < config.crossing_margin)
+    if not stands.any():
+        return []
+    closed = frozenset().union(*(view.line.crosses for view in views if _is_green(view)))
+    places = scene.futures.stations[still, 0] + graph.window.station
+    waits = np.zeros_like(stands)
+    for crossing in crossings:
+        if crossing.lane not in closed:
+            waits |= (places > crossing.start_station - AT_CROSSING) & (places < crossing.end_station + AT_CROSSING)
+    rows: list[int] = (scene.moving + (stands & waits).nonzero()[0]).tolist()
+    return rows
+
+
+def _is_green(view: LineView) -> bool:
+    """Whether nobody goes before the ego at a signal."""
+    return view.line.control is Control.SIGNAL and not view.stop and not view.goes_first
 
 
 def _hiding(graph: Graph, line: float) -> float:

@@ -137,7 +137,7 @@ class Planner:
     def _profile(self, start: StartState, graph: Graph, views: list[LineView], choice: LaneChoice) -> Profile:
         """The fastest motion that all demands allow, found by adding demands until nobody else is in the way."""
         config, shape = self._config, self._shape
-        caps = speed_caps(graph, views, shape, config)
+        caps = speed_caps(start.speed, graph, views, self._route.crossings, shape, config)
         if abs(math.remainder(start.heading - float(graph.path.headings[0]), 2.0 * math.pi)) > _ASTRAY:
             caps = [min(cap, config.astray_speed) for cap in caps]
         leaders, others = leading(graph, shape, config)

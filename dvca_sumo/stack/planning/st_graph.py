@@ -13,12 +13,12 @@ from dvca_sumo.stack.planning.scene import ALONG, Flags, Scene
 from dvca_sumo.stack.planning.speed import STEP_TIMES, Leader
 
 PRESENT = 0.3  # [s] what occupies the path within this time is there already
+AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
 
 _BICYCLE, _PERSON = int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 _WALKS_ACROSS = 0.3  # [m/s] sideways
 _NEVER = 1e4  # [m] for places where there is no leader
 _LANE_ROOM = 0.3  # [m] of lane beside the ego's width that is enough for `trusts_lane_room`
-_AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
 _DOUBT = 1.0  # [m] gaps to what stands, and overlaps, up to which its outline is looked at
 _PARTS = 12  # of each side of an outline
 _GRAZING = 0.6  # [m] of overlap of who moves and the body, up to which the outline is looked at
@@ -174,7 +174,7 @@ def _margins(
         margins[scene.moving :][people[scene.moving :]] = config.object_margin
     margins[across] = config.crossing_person_margin
     for crossing in crossings:
-        begin, end = crossing.start_station - _AT_CROSSING, crossing.end_station + _AT_CROSSING
+        begin, end = crossing.start_station - AT_CROSSING, crossing.end_station + AT_CROSSING
         margins[across & (stations > begin) & (stations < end)] = config.crossing_margin
     return margins
 

@@ -223,6 +223,29 @@ def test_people_go_first_but_before_a_crossing_where_they_have_to_wait(
     assert ("yield 3" in driven.decisions) is is_waited_for
 
 
+@pytest.mark.parametrize(
+    ("speed", "control", "is_slow"),
+    [
+        (1.0, Control.PRIORITY, True),  # they may set off as the ego does
+        (10.0, Control.PRIORITY, False),  # they let it pass
+        (1.0, Control.SIGNAL, False),  # they have red
+    ],
+)
+def test_past_people_at_the_kerb_of_a_crossing_the_ego_does_not_speed_up(
+    speed: float,
+    control: Control,
+    is_slow: bool,  # noqa: FBT001
+) -> None:
+    line = stop_line(112.0, control, yields_to=frozenset(), crosses=frozenset({"c"}))
+    route = road(stop_lines=[line], crossings=[Crossing("c", 114.0, 118.0)])
+    green = {line.signal_id: SignalColour.GREEN} if line.signal_id else {}
+    waiting = person(3, 117.0, -2.4, heading=UP)
+    driven = drive(route, 12.0, station=106.0, speed=speed, actors=[waiting], signals=lambda _: green)
+    before = (driven.fronts > 112.0) & (driven.fronts < 116.0)
+    assert bool(driven.speeds[before].max() < 1.7) is is_slow
+    assert driven.speeds[-1] > 8.0
+
+
 def test_behind_people_who_walk_away_the_ego_drives_on() -> None:
     """They are 0.6 m beside its way."""
     crossing = Crossing("c", 108.0, 112.0)
