@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dvca_sumo.messages import PREDICTION_TIMES, Floats, ObjectClass, VehicleShape
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.scene import Flags
@@ -26,16 +26,30 @@ class Ahead(NamedTuple):
     is_vehicle: Flags  # (n,)
 
 
-def ahead(graph: Graph, shape: VehicleShape) -> Ahead:
-    """Those whom the path meets where they are now: each by the slowest of its futures."""
+def ahead(graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfig) -> Ahead:
+    """Those whom the path meets where they are now: each by the slowest of its futures.
+
+    People who walk off it before an ego at `speed` [m/s] gets to them do not stand there.
+    """
     scene = graph.scene
     rows = graph.occupied[:, 0].nonzero()[0]
     ways = np.where(rows < scene.moving, graph.low[rows, _SOON] - graph.low[rows, 0], -np.inf)
+    ways[_walks_off(rows, graph, speed, shape, config)] = np.inf
     slowest = np.argsort(ways, kind="stable")
     owners, firsts = np.unique(scene.owners[rows[slowest]], return_index=True)
     chosen = slowest[firsts]
     rears, fronts = graph.low[rows[chosen], 0] - shape.front, graph.high[rows[chosen], 0] - shape.front
     return Ahead(rears, fronts, ways[chosen] < _CREEPS, scene.classes[owners] != _PERSON)
+
+
+def _walks_off(rows: Integers, graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfig) -> Flags:
+    """Whether each future of `rows` (k,) is that of a person who is off the path when the ego may get there: (k,)."""
+    scene, last = graph.scene, np.array(graph.last, dtype=np.int64)[rows]
+    to_go = np.maximum(graph.low[rows, 0] - shape.front, 0.0)
+    arrivals = (np.sqrt(speed * speed + 2.0 * config.acceleration * to_go) - speed) / config.acceleration
+    leaves = (last < len(scene.times) - 1) & (scene.times[last] < arrivals)
+    off: Flags = leaves & (scene.classes[scene.owners[rows]] == _PERSON)
+    return off
 
 
 def is_blocked(

@@ -182,7 +182,7 @@ def nearest_stop(
         closer = _closing_up(usual, views, shape, config)
         stops.append(Stop(usual + closer, config.object_gap - closer - _GIVE_AT_OBJECT, label))
     if views and graph.occupied[:, 0].any():
-        those = ahead(graph, shape)
+        those = ahead(graph, speed, shape, config)
         for view in views:
             stops += _before_blocked(view, those, speed, shape, config)
     return min(stops, key=lambda stop: stop.at)

@@ -592,6 +592,24 @@ def test_who_is_too_near_a_line_to_stop_at_it_goes_on_to_the_occupied_exit() -> 
     assert driven.states[:, 5].min() > -4.0
 
 
+@pytest.mark.parametrize(
+    ("pace", "is_waited_for"),
+    [
+        (1.3, False),  # off the road when the ego gets there
+        (0.0, True),
+    ],
+)
+def test_a_junction_is_entered_while_people_walk_off_the_road_beyond_it(
+    pace: float,
+    is_waited_for: bool,  # noqa: FBT001
+) -> None:
+    line = stop_line(100.0, Control.PRIORITY, yields_to=frozenset())
+    walker = person(3, 116.0, 0.0, heading=UP, speed=pace)
+    driven = drive(road(stop_lines=[line]), 3.0, speed=8.0, station=70.0, actors=[walker])
+    assert ("stop exit occupied" in driven.decisions) is is_waited_for
+    assert driven.clearances.min() > 1.0
+
+
 def test_unlikely_future_is_ignored_and_a_likely_one_is_not() -> None:
     crossing = predicted([person(3, 60.0, -6.0, heading=UP, speed=1.4)], 0.0)
     decisions = {}
