@@ -76,9 +76,9 @@ class Profile(msgspec.Struct, frozen=True, eq=False):
 
 def slowed_before(caps: Floats, arcs: Floats, braking: float) -> Floats:
     """The highest speed at each of `arcs` from which all `caps` [m/s] further on are kept at `braking`."""
-    energies = caps * caps + (2.0 * braking) * arcs
-    lowest: Floats = np.minimum.accumulate(energies[::-1])[::-1]
-    return np.sqrt(np.maximum(lowest - (2.0 * braking) * arcs, 0.0))
+    gained = (2.0 * braking) * arcs
+    lowest: Floats = np.minimum.accumulate((caps * caps + gained)[::-1])[::-1]
+    return np.sqrt(np.maximum(lowest - gained, 0.0))
 
 
 def roll_out(
@@ -92,11 +92,12 @@ def roll_out(
     """The motion from `speed` and `acceleration`; `caps` [m/s] by metre of path."""
     s, v, a = 0.0, speed, acceleration
     arcs, speeds, accelerations = [s], [v], [a]
-    last, label = len(caps) - 1, ""
+    label, last = "", caps[-1]
     highest, lowest = config.acceleration, -config.comfort_braking
+    is_steady = leader is None and all(stop.until == math.inf for stop in stops)
     for k in range(STEPS):
         metre = int(s + v * _LOOK_AHEAD)
-        free = (caps[min(metre, last)] - v) / _LOOK_AHEAD
+        free = ((caps[metre] if metre < len(caps) else last) - v) / _LOOK_AHEAD
         if free > highest:
             free = highest
         elif free < lowest:
@@ -112,6 +113,11 @@ def roll_out(
                 wanted, because = allowed, leader.label
         if not label and k < _EXPLAINED and wanted < free - _NOTICEABLE:
             label = because
+        if is_steady and wanted <= 0.0 and v == a == 0.0:  # it stands for the rest
+            arcs += [s] * (STEPS - k)
+            speeds += [0.0] * (STEPS - k)
+            accelerations += [0.0] * (STEPS - k)
+            break
         s, v, a = _moved(s, v, a, wanted, config)
         arcs.append(s)
         speeds.append(v)
@@ -161,15 +167,16 @@ def _for_leader(gap: float, v: float, leader_speed: float, config: PlanningConfi
 
 def _moved(s: float, v: float, a: float, wanted: float, config: PlanningConfig) -> tuple[float, float, float]:
     """One step on, with the acceleration moving linearly towards `wanted` within the limits of jerk."""
-    is_comfort = wanted >= -config.comfort_braking and a >= -config.comfort_braking
-    change = (config.jerk if is_comfort else config.hard_jerk) * STEP
+    if wanted >= -config.comfort_braking and a >= -config.comfort_braking:
+        change = config.jerk * STEP
+    else:
+        change, wanted = config.hard_jerk * STEP, max(wanted, -config.hard_braking)
     if wanted > a + change:
         after = a + change
     elif wanted < a - change:
         after = a - change
     else:
         after = wanted
-    after = max(after, -config.hard_braking)
     if v <= 0.0 and after <= 0.0:
         return s, 0.0, 0.0
     reached = v + 0.5 * STEP * (a + after)
