@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from dvca_sumo.messages import Floats, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
@@ -103,51 +102,44 @@ def path_along(
     """From the start state onto the reference line, or onto the plateaus where there are any."""
     count = window.rows.shape[1] - BEHIND
     offsets, slopes, bends = _profile(lateral, plateaus, start.speed, count, config)
-    ahead = slice(BEHIND, None)
-    cosines, sines, curvatures = window.cosines[ahead], window.sines[ahead], window.curvatures[ahead]
-    x = window.x[ahead] - offsets * sines
-    y = window.y[ahead] + offsets * cosines
+    line = window.rows[:6, BEHIND:]
+    _, _, cosines, sines, line_headings, line_curvatures = line
+    points = np.empty((2, count))
+    x, y = points
+    np.subtract(line[0], offsets * sines, out=x)
+    np.add(line[1], offsets * cosines, out=y)
     fade = _FADE[:count]  # near the end of the line the window is short
     x[: len(fade)] += (start.x - x[0]) * fade
     y[: len(fade)] += (start.y - y[0]) * fade
-    scale = 1.0 - curvatures * offsets
+    scale = 1.0 - line_curvatures * offsets
     tangents = slopes / scale
     cosines_to_line = 1.0 / np.sqrt(1.0 + tangents * tangents)
     angles, turns = np.arctan(tangents), np.zeros(count)
     turns[0] = bends[0] * cosines_to_line[0] * cosines_to_line[0] / scale[0]
     turns[1:-1] = 0.5 * (angles[2:] - angles[:-2])  # what they are at a row says little of moves as short as rows are
     arcs = np.zeros(count)
-    np.hypot(x[1:] - x[:-1], y[1:] - y[:-1]).cumsum(out=arcs[1:])
-    headings = window.headings[ahead] + angles
-    left, right = swept(x, y, headings, window.rows[:4, ahead], shape)
-    return Path(
-        x=x,
-        y=y,
-        headings=headings,
-        curvatures=(curvatures + turns) * cosines_to_line / scale,
-        arcs=arcs,
-        left=np.concatenate((np.full(BEHIND, left[0]), left)),
-        right=np.concatenate((np.full(BEHIND, right[0]), right)),
-    )
+    np.hypot(*(points[:, 1:] - points[:, :-1])).cumsum(out=arcs[1:])
+    headings = line_headings + angles
+    sides = np.empty((2, BEHIND + count))
+    sides[:, BEHIND:] = swept(points, headings, line[:4], shape)
+    sides[:, :BEHIND] = sides[:, BEHIND : BEHIND + 1]
+    return Path(x, y, headings, (line_curvatures + turns) * cosines_to_line / scale, arcs, *sides)
 
 
-def _profile(
-    lateral: Lateral, plateaus: Sequence[Plateau], speed: float, count: int, config: PlanningConfig
-) -> tuple[Floats, Floats, Floats]:
-    """Offset, slope and bend at stations 0 ... count-1: holds and blends between them."""
-    offsets, slopes, bends = (np.zeros(count) for _ in range(3))
+def _profile(lateral: Lateral, plateaus: Sequence[Plateau], speed: float, count: int, config: PlanningConfig) -> Floats:
+    """Offset, slope and bend at stations 0 ... count-1 (3, count): holds and blends between them."""
+    profile = np.zeros((3, count))
     position, state = 0.0, lateral
     for begin, end, target in _blends(lateral, plateaus, speed, config):
-        first, last = math.ceil(position), min(math.ceil(begin), count)
-        offsets[first:last] = state.offset
         first, last = math.ceil(begin), min(math.ceil(end), count)
+        profile[0, math.ceil(position) : first] = state.offset
         if first < last:
-            rows = slice(first, last)
-            along = np.arange(first, last) - begin
-            offsets[rows], slopes[rows], bends[rows] = _blend(state, target, end - begin, along)
+            profile[:, first:last] = _blend(
+                state, target, end - begin, np.arange(first, last, dtype=np.float64) - begin
+            )
         position, state = end, Lateral(target, 0.0, 0.0)
-    offsets[min(math.ceil(position), count) :] = state.offset
-    return offsets, slopes, bends
+    profile[0, math.ceil(position) :] = state.offset
+    return profile
 
 
 def _blends(
@@ -182,17 +174,19 @@ def _blends(
     return blends
 
 
-def _blend(
-    state: Lateral, target: float, length: float, along: npt.NDArray[np.floating]
-) -> tuple[Floats, Floats, Floats]:
-    """The quintic of least jerk from `state` to rest at `target` after `length`, at distances `along`."""
+def _blend(state: Lateral, target: float, length: float, along: Floats) -> Floats:
+    """The quintic of least jerk from `state` to rest at `target` after `length`, at distances `along` (n,).
+
+    Offset, slope and bend there (3, n).
+    """
     first, second = state.slope * length, 0.5 * state.bend * length * length
     third, fourth, fifth = _upper_terms(target - state.offset, first, second)
     u = along / length
-    offsets = state.offset + u * (first + u * (second + u * (third + u * (fourth + u * fifth))))
-    slopes = (first + u * (2.0 * second + u * (3.0 * third + u * (4.0 * fourth + u * (5.0 * fifth))))) / length
-    bends = (2.0 * second + u * (6.0 * third + u * (12.0 * fourth + u * (20.0 * fifth)))) / (length * length)
-    return offsets, slopes, bends
+    blend = np.empty((3, len(u)))
+    blend[0] = state.offset + u * (first + u * (second + u * (third + u * (fourth + u * fifth))))
+    blend[1] = (first + u * (2.0 * second + u * (3.0 * third + u * (4.0 * fourth + u * (5.0 * fifth))))) / length
+    blend[2] = (2.0 * second + u * (6.0 * third + u * (12.0 * fourth + u * (20.0 * fifth)))) / (length * length)
+    return blend
 
 
 def _upper_terms(rise: float, first: float, second: float) -> tuple[float, float, float]:

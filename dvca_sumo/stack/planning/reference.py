@@ -61,7 +61,7 @@ class Window(msgspec.Struct, frozen=True, eq=False):
     def up_to_fold(self) -> "Window":
         """The part before the line turns back: who is beside that may be nearer to what comes after the turn."""
         turns = np.abs(self.headings[BEHIND:] - self.headings[BEHIND]) > _TURNED_BACK
-        if not turns.any():
+        if not np.count_nonzero(turns):
             return self
         rows = self.rows[:, : BEHIND + max(int(turns.argmax()), 1)]
         return Window(self.station, rows, *rows)
@@ -92,11 +92,15 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         cost. Offsets of points beyond an end hold the distance to that end.
         """
         nodes = self.rows[:2, ::_NODES]
-        nearest = (points @ (-2.0 * nodes) + (nodes * nodes).sum(axis=0)).argmin(axis=1) * _NODES
+        x, y = nodes
+        squares = points @ (-2.0 * nodes)
+        squares += x * x + y * y  # of the distances, less the points' own
+        nearest = squares.argmin(axis=1) * _NODES
         ahead, across, curvatures, _ = self._seen(points, nearest)
         rough = ahead / np.maximum(1.0 - curvatures * across, _NEAREST_CENTRE)
-        nearest = self.index(nearest + np.minimum(np.maximum(rough, -_NODES), _NODES) - BEHIND)
-        ahead, across, curvatures, headings = self._seen(points, nearest)
+        rows = np.rint(nearest + np.minimum(np.maximum(rough, -_NODES), _NODES))
+        np.minimum(np.maximum(rows, 0.0, out=rows), self.rows.shape[1] - 1.0, out=rows)
+        ahead, across, curvatures, headings = self._seen(points, rows.astype(np.int64))
         scale = np.maximum(1.0 - curvatures * across, _NEAREST_CENTRE)
         step = np.minimum(np.maximum(ahead / scale, -1.0), 1.0)
         turn = curvatures * step
@@ -105,10 +109,10 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         beyond = (np.abs(missed) > 1.0).nonzero()[0]
         if beyond.size:
             offsets[beyond] = np.copysign(np.hypot(missed[beyond], offsets[beyond]), offsets[beyond])
-        return step + (nearest - BEHIND), offsets, headings + turn
+        return step + (rows - BEHIND), offsets, headings + turn
 
-    def _seen(self, points: Floats, nearest: Integers) -> tuple[Floats, Floats, Floats, Floats]:
-        x, y, cosines, sines, headings, curvatures = self.rows[:6].take(nearest, axis=1)
+    def _seen(self, points: Floats, rows: Integers) -> tuple[Floats, Floats, Floats, Floats]:
+        x, y, cosines, sines, headings, curvatures = self.rows[:6].take(rows, axis=1)
         x = points[:, 0] - x
         y = points[:, 1] - y
         return x * cosines + y * sines, y * cosines - x * sines, curvatures, headings
@@ -135,8 +139,9 @@ class Reference:
         body = (-shape.rear_overhang - 1.0, shape.front + 1.0)
         table[_LIMIT] = _lowest_within(inside, line.stations, _limits(route, config), body)
         line_rows = table[[_X, _Y, _COS, _SIN]]
-        table[_SWEPT_LEFT], table[_SWEPT_RIGHT] = swept(table[_X], table[_Y], table[_HEADING], line_rows, shape)
+        table[_SWEPT_LEFT:] = swept(table[:2], table[_HEADING], line_rows, shape)
         self._table = table
+        self._steps = table[:, 1:] - table[:, :-1]
         self._end = line.length + _BEYOND - _OUTLOOK
 
     def locate(self, x: float, y: float, near: float) -> tuple[float, float, float] | None:
@@ -167,35 +172,36 @@ class Reference:
         """From BEHIND before `station` to at least `length` past it, interpolated linearly."""
         first = station + 2.0
         whole = int(first)
-        count = BEHIND + int(length) + 2
-        low = self._table[:, whole : whole + count]
-        high = self._table[:, whole + 1 : whole + 1 + count]
-        rows = high[:, : low.shape[1]] - low[:, : high.shape[1]]
-        rows *= first - whole
-        rows += low[:, : high.shape[1]]
+        part = slice(whole, whole + BEHIND + int(length) + 2)
+        rows = self._steps[:, part] * (first - whole)
+        rows += self._table[:, part][:, : rows.shape[1]]
         return Window(station, rows, *rows)
 
 
-def swept(x: Floats, y: Floats, headings: Floats, line: Floats, shape: VehicleShape) -> tuple[Floats, Floats]:
-    """Where the sides of the body pass each station: leftmost and rightmost offset (n,) from the line [m].
+def swept(points: Floats, headings: Floats, line: Floats, shape: VehicleShape) -> Floats:
+    """Where the sides of the body pass each station: leftmost and rightmost offset (2, n) from the line [m].
 
-    The rear axle comes through poses (n,), one beside each of the rows x, y, cosine and sine of `line` (4, n), 1 m
+    The rear axle comes through `points` (2, n), one beside each of the rows x, y, cosine and sine of `line` (4, n), 1 m
     apart. The body is straight ahead of the rear axle, however the line bends.
     """
-    half, metres = 0.5 * shape.width, math.ceil(shape.front) + 1
-    count = len(x) - metres + 1
-    ahead = np.minimum(np.arange(1.0, metres), shape.front)[:, None]  # of the axle, each a station farther
-    left = (y - line[1]) * line[2] - (x - line[0]) * line[3]
-    right = left.copy()
-    x_ahead, y_ahead, cosines, sines = line.take(np.arange(1, metres)[:, None] + np.arange(count), axis=1)
-    turned = headings[:count]
-    offsets = (y[:count] + ahead * np.sin(turned) - y_ahead) * cosines
-    offsets -= (x[:count] + ahead * np.cos(turned) - x_ahead) * sines
-    for metre, offset in enumerate(offsets, 1):
-        part = slice(metre, metre + count)
-        np.maximum(left[part], offset, out=left[part])
-        np.minimum(right[part], offset, out=right[part])
-    return left + half, right - half
+    metres, stations = math.ceil(shape.front) + 1, len(headings)
+    count = stations - metres + 1
+    ahead = np.minimum(np.arange(metres, dtype=np.float64), shape.front)[:, None]  # of the axle, each a station farther
+    # One row for what is so far ahead of the axle, in two layouts: by station, and each one place longer, by axle.
+    spots = np.empty((2, metres * (stations + 1)))
+    by_station = spots[:, : metres * stations].reshape(2, metres, stations)
+    by_axle = spots.reshape(2, metres, stations + 1)[:, :, :count]
+    by_station[:] = points[:, None]  # where the axle has come from too near
+    by_axle[0] = ahead * np.cos(headings[:count])
+    by_axle[1] = ahead * np.sin(headings[:count])
+    by_axle += points[:, None, :count]
+    by_station -= line[:2, None]
+    offsets = by_station[1] * line[2]
+    offsets -= by_station[0] * line[3]
+    sides = np.empty((2, stations))
+    np.add(np.maximum.reduce(offsets), 0.5 * shape.width, out=sides[0])
+    np.subtract(np.minimum.reduce(offsets), 0.5 * shape.width, out=sides[1])
+    return sides
 
 
 def _limits(route: Route, config: PlanningConfig) -> Floats:
