@@ -15,11 +15,11 @@ def blocking(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> int |
     """
     window, path, scene = graph.window, graph.path, graph.scene
     now, buffer = scene.now, config.lateral_buffer
-    lows, highs = now.stations - now.half_lengths, now.stations + now.half_lengths
+    lows = now.stations - now.half_lengths
     stands_ahead = scene.is_standing & (lows > shape.front)
-    if not stands_ahead.any():
+    if not np.count_nonzero(stands_ahead):
         return None
-    rows = window.index(now.stations)
+    highs, rows = now.stations + now.half_lengths, window.index(now.stations)
     is_left = now.offsets > 0.5 * (path.left[rows] + path.right[rows])
     inner = now.offsets + np.where(is_left, -1.0, 1.0) * (now.half_widths + buffer)
     narrows = stands_ahead & np.where(is_left, inner < window.road_left[rows], inner > window.road_right[rows])

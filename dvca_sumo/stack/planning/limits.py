@@ -181,7 +181,7 @@ def nearest_stop(
         usual = float(graph.low[obstacle, 0]) - shape.front - gap
         closer = _closing_up(usual, views, shape, config)
         stops.append(Stop(usual + closer, config.object_gap - closer - _GIVE_AT_OBJECT, label))
-    if views and graph.occupied[:, 0].any():
+    if views and np.count_nonzero(graph.occupied[:, 0]):
         those = ahead(graph, speed, shape, config)
         for view in views:
             stops += _before_blocked(view, those, speed, shape, config)
@@ -221,13 +221,15 @@ def _obstacle(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> int 
     """
     scene, blocker = graph.scene, blocking(graph, shape, config)
     still = slice(scene.moving, None)
+    occupied = graph.occupied[still, 0]
+    if blocker is None and not np.count_nonzero(occupied):
+        return None
     low = graph.low[still, 0]
-    is_person = scene.classes[scene.owners[still]] == _PERSON
-    nearest = np.where(is_person, config.person_least, 0.0)
-    is_beside = graph.occupied[still, 0] & (low <= shape.front) & (graph.gaps[still, 0] < nearest)
+    nearest = np.where(scene.is_person[still], config.person_least, 0.0)
+    is_beside = occupied & (low <= shape.front) & (graph.gaps[still, 0] < nearest)
     if is_beside.any():
         is_beside[is_beside] = ~_is_behind(graph, scene.owners[still][is_beside], shape)
-    in_way = is_beside | (graph.occupied[still, 0] & (low > shape.front))
+    in_way = is_beside | (occupied & (low > shape.front))
     if blocker is not None:
         in_way |= scene.owners[still] == blocker
     return scene.moving + int(np.where(in_way, low, np.inf).argmin()) if in_way.any() else None

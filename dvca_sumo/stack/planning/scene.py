@@ -57,6 +57,7 @@ class Scene(msgspec.Struct, frozen=True, eq=False):
     now: Extents  # (n,)
     times: Floats  # (t,) [s] from the present
     owners: Integers  # (h,) row of the object
+    is_person: Flags  # (h,) whether that is one
     probabilities: Floats  # (h,)
     lanes: list[tuple[str, ...]]  # (h,) followed; the one it is on of who stays
     futures: Extents  # (h, t)
@@ -76,12 +77,10 @@ def scene_in(
     objects = predicted.objects
     speeds = np.hypot(objects.velocities[:, 0], objects.velocities[:, 1])
     ids: list[int] = objects.ids.tolist()
-    has_stood = np.array([track in stood for track in ids], dtype=np.bool_)
+    is_person: Flags = objects.classes == _PERSON
     counts = predicted.probabilities >= config.possible
-    foreseen = _foreseen_speeds(predicted, counts)
-    people = np.where(has_stood, config.standing_speed, config.lingering_speed)
-    others = np.where(has_stood, config.moving_speed, config.standing_speed)
-    standing = foreseen < np.where(objects.classes == _PERSON, people, others)
+    slowest = _slowest_moving(ids, is_person.tolist(), stood, config)
+    standing = _foreseen_speeds(predicted, counts) < np.array(slowest)
     counts &= ~standing[predicted.owners]
     stays = np.ones(len(standing), dtype=np.bool_)
     stays[predicted.owners[counts]] = False
@@ -93,6 +92,7 @@ def scene_in(
     owners = predicted.owners[rows]
     on = dict(zip(predicted.owners.tolist(), predicted.lanes, strict=True))
     now, futures = _extents(window, objects.boxes, poses, owners, still)
+    owners = np.concatenate((owners, still))
     return Scene(
         ids=ids,
         classes=objects.classes,
@@ -101,13 +101,23 @@ def scene_in(
         is_standing=standing,
         now=now,
         times=PREDICTION_TIMES - (time - predicted.time),
-        owners=np.concatenate((owners, still)),
+        owners=owners,
+        is_person=is_person[owners],
         probabilities=np.concatenate((predicted.probabilities[rows], np.ones(len(still)))),
         lanes=[predicted.lanes[row] for row in rows.tolist()] + [on.get(row, ()) for row in still.tolist()],
         futures=futures,
         moving=len(rows),
         poses=poses,
     )
+
+
+def _slowest_moving(
+    ids: list[int], is_person: list[bool], stood: Container[int], config: PlanningConfig
+) -> list[float]:
+    """The speed (n,) below which each object stands [m/s]: people who walk may slow down, vehicles that stood creep."""
+    people = (config.lingering_speed, config.standing_speed)
+    others = (config.standing_speed, config.moving_speed)
+    return [(people if person else others)[track in stood] for track, person in zip(ids, is_person, strict=True)]
 
 
 def _foreseen_speeds(predicted: PredictedObjects, counts: Flags) -> Floats:
@@ -146,7 +156,7 @@ def _extents(
     now = placed[:, :count]
     futures = np.empty((5, moving + len(still), times))
     futures[:, :moving] = placed[:, count:].reshape(5, moving, times)
-    futures[:, moving:] = now[:, still, None]
+    futures[:, moving:] = now.take(still, axis=1)[:, :, None]
     return Extents(*now), Extents(*futures)
 
 

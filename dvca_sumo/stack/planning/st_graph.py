@@ -76,12 +76,12 @@ def graph_of(
     """
     futures = scene.futures
     rows = futures.rows(window)
-    gaps = futures.gaps(path.left[rows].max(axis=0), path.right[rows].min(axis=0))
+    gaps = futures.gaps(np.maximum.reduce(path.left.take(rows)), np.minimum.reduce(path.right.take(rows)))
     _look_closely(gaps[scene.moving :], scene, window, path)
     count = len(path.arcs)
     stretch = np.zeros(BEHIND + count)
-    stretch[BEHIND:] = path.arcs - np.arange(count)
-    centres = futures.stations + stretch[rows[0]]
+    stretch[BEHIND:] = path.arcs - np.arange(count, dtype=np.float64)
+    centres = futures.stations + stretch.take(rows[0])
     low, high = centres - futures.half_lengths, centres + futures.half_lengths
     margins = _margins(scene, gaps, window, route.crossings, speed, config)
     occupied = gaps < margins[:, None]
@@ -122,7 +122,7 @@ def _closely(boxes: Floats, window: Window, path: Path) -> tuple[Floats, Floats]
     """Stations of points all around boxes (n, 5), box by box, and how far each is beside the body there [m]."""
     stations, offsets, _ = window.project(outlines(boxes, _PARTS).reshape(-1, 2))
     rows = window.index(stations)
-    return stations, np.maximum(offsets - path.left[rows], path.right[rows] - offsets)
+    return stations, np.maximum(offsets - path.left.take(rows), path.right.take(rows) - offsets)
 
 
 def _pass_over(occupied: Flags, overpass: Overpass, scene: Scene, window: Window) -> None:
@@ -162,8 +162,8 @@ def _margins(
     """
     classes = scene.classes[scene.owners]
     margins = np.where(classes == _BICYCLE, config.bicycle_margin, config.object_margin)
-    people = classes == _PERSON
-    if not people.any():
+    people = scene.is_person
+    if not np.count_nonzero(people):
         return margins
     offsets, stations = scene.futures.offsets, scene.futures.stations[:, 0] + window.station
     walked = np.abs(offsets[:, 1] - offsets[:, 0])
@@ -181,7 +181,7 @@ def _margins(
 
 def _let_leave(occupied: Flags, scene: Scene, gaps: Floats, config: PlanningConfig) -> None:
     """Free the path of people who walk away from it, their nearest moment past."""
-    people = (scene.classes[scene.owners] == _PERSON).nonzero()[0]
+    people = scene.is_person.nonzero()[0]
     if people.size:
         gaps = gaps[people]
         leaves = np.arange(gaps.shape[1]) > gaps.argmin(axis=1)[:, None]
@@ -194,29 +194,22 @@ def leading(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> tuple[
     Left out are unlikely ones that are not about to happen, and who drives behind the ego. People beside it do not
     lead it.
     """
-    scene = graph.scene
-    rows = np.flatnonzero(graph.occupied[: scene.moving].any(axis=1))
-    if not rows.size:
-        return [], []
-    is_along = scene.futures.directions[rows, 0] > ALONG
-    is_in_lane = (is_along & (graph.gaps[rows, 0] < config.object_margin)).tolist()
-    is_ahead = (scene.futures.stations[rows, 0] > shape.centre).tolist()
-    is_beside = (scene.classes[scene.owners[rows]] == _PERSON) & (graph.low[rows, 0] < shape.front)
-    chances = scene.probabilities[rows].tolist()
+    scene, futures = graph.scene, graph.scene.futures
     leaders: list[int] = []
     others: list[int] = []
-    for row, in_lane, ahead, beside, chance in zip(
-        rows.tolist(), is_in_lane, is_ahead, is_beside.tolist(), chances, strict=True
-    ):
-        first = graph.first[row]
-        entry = float(scene.times[first])
-        if chance < (config.possible if entry < config.soon else config.likely):
+    for row, first in enumerate(graph.first[: scene.moving]):
+        if not graph.occupied[row, first]:
             continue
-        if beside or abs(scene.futures.directions[row, first]) < ALONG or (entry > PRESENT and not in_lane):
+        entry = scene.times[first]
+        if scene.probabilities[row] < (config.possible if entry < config.soon else config.likely):
+            continue
+        is_in_lane = futures.directions[row, 0] > ALONG and graph.gaps[row, 0] < config.object_margin
+        is_beside = scene.is_person[row] and graph.low[row, 0] < shape.front
+        if is_beside or abs(futures.directions[row, first]) < ALONG or (entry > PRESENT and not is_in_lane):
             others.append(row)
-        elif ahead:
+        elif futures.stations[row, 0] > shape.centre:
             (leaders if entry <= PRESENT else others).append(row)
-        elif not in_lane:
+        elif not is_in_lane:
             others.append(row)
     return leaders, others
 
