@@ -25,6 +25,6 @@ def message_of(tracked: TrackedObjects, *parts: Hypotheses) -> PredictedObjects:
         objects=tracked,
         owners=owners[order],
         probabilities=np.concatenate([part.probabilities for part in parts])[order],
-        poses=np.concatenate([part.poses for part in parts])[order],
+        poses=np.concatenate([part.poses for part in parts]).take(order, axis=0),
         lanes=tuple(lanes[row] for row in order.tolist()),
     )

@@ -6,7 +6,7 @@ import numpy as np
 from dvca_sumo.messages import Floats, TrackedObjects
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.lane_following import Candidates, joined
-from dvca_sumo.stack.lane_paths import LanePath, LanePaths
+from dvca_sumo.stack.lane_paths import LanePath, LanePaths, stretches_of
 
 
 class LaneChangeConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -44,7 +44,7 @@ class LaneChanges:
         Returns:
             All candidates, and the lateral speeds of all.
         """
-        if not (np.abs(drift) >= self._config.min_lateral_speed).any():
+        if not np.count_nonzero(np.abs(drift) >= self._config.min_lateral_speed):
             return candidates, drift
         likely, sides = self._changing(candidates, drift)
         rows: list[int] = []
@@ -60,7 +60,7 @@ class LaneChanges:
         if not rows:
             return candidates, drift
         owners = candidates.owners[rows]
-        places = self._paths.project(paths, np.array(guesses), tracked.boxes[owners, :2])
+        places = self._paths.project(stretches_of(paths), np.array(guesses), tracked.boxes[owners, :2])
         changes = Candidates(owners, paths, likely[rows], places).chosen(np.flatnonzero(places.beyond == 0.0))
         kept = np.ones(len(tracked.ids))
         kept[changes.owners] -= changes.probabilities

@@ -14,7 +14,7 @@ import numpy as np
 from dvca_sumo.geometry.angles import wrapped, wrapped_all
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap
-from dvca_sumo.stack.lane_paths import LanePath, LanePaths, Placements
+from dvca_sumo.stack.lane_paths import LanePath, LanePaths, Placements, stretches_of
 
 _NO_FIT = 1e30  # a misfit beyond that of any lane an object fits
 
@@ -143,7 +143,7 @@ class LaneFollowing:
                 priors.append(probability)
                 guesses.append(anchor.station)
         objects = np.array(owners, dtype=np.int64)
-        places = self._paths.project(paths, np.array(guesses), movers.points[objects])
+        places = self._paths.project(stretches_of(paths), np.array(guesses), movers.points[objects])
         config = self._config
         errors = wrapped_all(movers.headings[objects] - places.headings)
         fits = (

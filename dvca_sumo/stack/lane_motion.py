@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.messages import PREDICTION_TIMES, Floats
-from dvca_sumo.stack.lane_paths import LanePath, LanePaths
+from dvca_sumo.stack.lane_paths import LanePaths, Stretches
 
 _HORIZON = float(PREDICTION_TIMES[-1])
 _CRAWL = 0.05  # [m/s] slower is standing still, within a prediction's horizon
@@ -35,9 +35,7 @@ class LaneMotion:
         """No object gets farther than this within the horizon [m]."""
         return np.maximum(speeds, speeds + trends * self._config.trend_duration) * _HORIZON + 10.0
 
-    def travelled(
-        self, paths: list[LanePath], stations: Floats, speeds: Floats, trends: Floats, farthest: float
-    ) -> Floats:
+    def travelled(self, paths: Stretches, stations: Floats, speeds: Floats, trends: Floats, farthest: float) -> Floats:
         """Stations at PREDICTION_TIMES (h, t) of objects at `stations` (h,), `trends` being accelerations (h,).
 
         None of them gets farther than `farthest` [m], by their `reach`.
@@ -63,11 +61,11 @@ class LaneMotion:
         times = np.zeros(profile.shape)
         (2.0 / (profile[:, 1:] + profile[:, :-1])).cumsum(axis=1, out=times[:, 1:])
         # All rows in one interpolation: each is moved to a stretch of the time axis of its own.
-        apart = 2.0 * _LATE * np.arange(len(paths))[:, None]
+        apart = 2.0 * _LATE * np.arange(len(stations))[:, None]
         wanted = (PREDICTION_TIMES + apart).ravel()
         known = (np.minimum(times, _LATE) + apart).ravel()
-        distances: Floats = np.interp(wanted, known, np.concatenate([metres] * len(paths)))
-        return stations[:, None] + distances.reshape(len(paths), -1)
+        distances: Floats = np.interp(wanted, known, np.concatenate([metres] * len(stations)))
+        return stations[:, None] + distances.reshape(len(stations), -1)
 
     def settled(
         self, offsets: Floats, targets: Floats, lateral_speeds: Floats, speeds: Floats

@@ -18,8 +18,8 @@ from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.continuations import Continuations
 
-_X, _Y, _HEADING = range(3)  # columns of poses
-_BEND_SPEED, _LIMIT, _HALF_WIDTH, _TURNED = range(4)  # rows of rules
+# Rows of the table. What is looked up together lies together.
+_X, _Y, _HEADING, _HALF_WIDTH, _BEND_SPEED, _LIMIT, _ROWS = range(7)
 
 _TAIL = 300  # [m] beyond a dead end or the net's edge, traffic is taken to go straight on
 _LENGTH_STEP = 40.0  # [m] continuations are kept by length in such steps
@@ -28,7 +28,7 @@ _WINDOW = np.arange(-8, 9)  # rows (metres) around a guessed station that a proj
 
 
 class LanePath(msgspec.Struct, frozen=True, eq=False):
-    """Lanes in driving order, as rows `first` ... `first + count - 1` of the table."""
+    """Lanes in driving order, as columns `first` ... `first + count - 1` of the table."""
 
     lanes: tuple[str, ...]
     starts: tuple[float, ...]  # [m] station at which each lane begins
@@ -42,6 +42,13 @@ class LanePath(msgspec.Struct, frozen=True, eq=False):
     def lanes_between(self, start: float, end: float) -> tuple[str, ...]:
         """The lanes from station `start` to station `end` [m]."""
         return self.lanes[self.lane_at(start) : self.lane_at(end) + 1]
+
+
+class Stretches(NamedTuple):
+    """Where paths lie in the table, one row each."""
+
+    first: Integers  # (h,) column
+    last: Integers  # (h,) column
 
 
 class Placements(NamedTuple):
@@ -63,8 +70,7 @@ class LanePaths:
         self._continuations = Continuations(roadmap, max_branches)
         self._lateral_acceleration = lateral_acceleration
         self._braking = braking
-        self._poses = np.empty((4096, 3))
-        self._rules = np.empty((4, 4096))
+        self._table = np.empty((_ROWS, 4096))
         self._used = 0
         self._paths: dict[tuple[str, ...], LanePath] = {}
         self._branches: dict[tuple[str, int], tuple[tuple[LanePath, float], ...]] = {}
@@ -80,55 +86,53 @@ class LanePaths:
             self._branches[key] = found
         return found
 
-    def project(self, paths: Sequence[LanePath], guesses: Floats, points: Floats) -> Placements:
+    def project(self, paths: Stretches, guesses: Floats, points: Floats) -> Placements:
         """Places `points` (h, 2) on their paths, searched around the stations guessed (h,)."""
-        first, last = _extents(paths)
-        rows = np.minimum(np.maximum(np.rint(guesses).astype(np.int64)[:, None] + _WINDOW, 0), last[:, None])
-        near = self._poses.take(rows + first[:, None], axis=0)[:, :, :_HEADING]
-        gaps = points[:, None, :] - near
-        nearest = np.einsum("hwc,hwc->hw", gaps, gaps).argmin(axis=1)
-        every = np.arange(len(rows))
-        gap, row = gaps[every, nearest], rows[every, nearest]
-        headings = self._poses[row + first, _HEADING]
+        first, last = paths
+        searched = (np.rint(guesses).astype(np.int64) + first)[:, None] + _WINDOW
+        searched = np.minimum(np.maximum(searched, first[:, None]), last[:, None])
+        x, y = self._table[: _Y + 1].take(searched, axis=1)
+        x, y = points[:, :1] - x, points[:, 1:] - y
+        nearest = searched[np.arange(len(searched)), (x * x + y * y).argmin(axis=1)]
+        x, y, headings, half_widths = self._table[: _HALF_WIDTH + 1].take(nearest, axis=1)
+        x, y = points[:, 0] - x, points[:, 1] - y
         cosines, sines = np.cos(headings), np.sin(headings)
-        along = gap[:, 0] * cosines + gap[:, 1] * sines
-        offsets = gap[:, 1] * cosines - gap[:, 0] * sines
-        # Rows are 1 m apart: unless the window missed it, the nearest is about half a metre away along the path.
+        along = x * cosines + y * sines
+        offsets = y * cosines - x * sines
+        # Columns are 1 m apart: unless the window missed it, the nearest is about half a metre away along the path.
         beyond = np.maximum(np.abs(along) - 1.0, 0.0)
-        return Placements(row + along, offsets, headings, self._rules[_HALF_WIDTH].take(row + first), beyond)
+        return Placements((nearest - first) + along, offsets, headings, half_widths, beyond)
 
-    def caps(self, paths: Sequence[LanePath], stations: Floats, count: int) -> tuple[Floats, Floats]:
+    def caps(self, paths: Stretches, stations: Floats, count: int) -> tuple[Floats, Floats]:
         """Speeds for bends, and speed limits, at `stations` (h,) and each of `count` metres on: (h, count) each."""
-        first, last = _extents(paths)
-        rows = np.maximum(np.rint(stations).astype(np.int64), 0)[:, None] + np.arange(count)
-        rows = np.minimum(rows, last[:, None]) + first[:, None]
-        return self._rules[_BEND_SPEED].take(rows), self._rules[_LIMIT].take(rows)
+        first, last = paths
+        metres = (np.maximum(np.rint(stations).astype(np.int64), 0) + first)[:, None] + np.arange(count)
+        bends, limits = self._table[_BEND_SPEED:].take(np.minimum(metres, last[:, None]), axis=1)
+        return bends, limits
 
-    def turned(self, paths: Sequence[LanePath], starts: Floats, ends: Floats) -> Floats:
-        """How far each path turns, either way, from station to station [rad]: (h,), of (h,) and (h,)."""
-        first, last = _extents(paths)
-        begin, end = (np.minimum(np.maximum(np.rint(at).astype(np.int64), 0), last) for at in (starts, ends))
-        turned: Floats = self._rules[_TURNED].take(end + first) - self._rules[_TURNED].take(begin + first)
-        return turned
-
-    def poses(self, paths: Sequence[LanePath], stations: Floats, offsets: Floats) -> Floats:
-        """Poses at `stations` (h, t), moved to the left by `offsets` (h, t): (h, t, 3), headings not wrapped."""
-        first, last = _extents(paths)
-        rows = np.minimum(np.maximum(stations.astype(np.int64), 0), last[:, None] - 1)
-        shares = (stations - rows)[:, :, None]
-        rows += first[:, None]
-        before = self._poses.take(rows, axis=0)
-        poses: Floats = before + shares * (self._poses.take(rows + 1, axis=0) - before)
-        poses[:, :, _X] -= offsets * np.sin(poses[:, :, _HEADING])
-        poses[:, :, _Y] += offsets * np.cos(poses[:, :, _HEADING])
+    def poses(self, paths: Stretches, stations: Floats, offsets: Floats) -> Floats:
+        """Poses at `stations` (h, t), moved to the left by `offsets` (h, t): x, y, headings, not wrapped (3, h, t)."""
+        first, last = paths
+        columns = np.minimum(np.maximum(stations.astype(np.int64), 0), (last - first - 1)[:, None])
+        shares = stations - columns
+        columns += first[:, None]
+        table = self._table[: _HEADING + 1]
+        before = table.take(columns, axis=1)
+        poses: Floats = table.take(columns + 1, axis=1)
+        poses -= before
+        poses *= shares
+        poses += before
+        x, y, headings = poses
+        x -= offsets * np.sin(headings)
+        y += offsets * np.cos(headings)
         return poses
 
-    def bodies(self, paths: Sequence[LanePath], stations: Floats, offsets: Floats, lengths: Floats) -> Floats:
+    def bodies(self, paths: Stretches, stations: Floats, offsets: Floats, lengths: Floats) -> Floats:
         """As `poses`, of the middles of bodies so long (h,) that both ends follow the path: chords in its bends."""
         half = 0.5 * lengths[:, None]
-        fronts, rears = (self.poses(paths, stations + end, offsets)[:, :, :_HEADING] for end in (half, -half))
-        ways = fronts - rears
-        return np.concatenate((0.5 * (fronts + rears), np.arctan2(ways[:, :, _Y], ways[:, :, _X])[:, :, None]), axis=2)
+        fronts, rears = (self.poses(paths, stations + end, offsets)[:_HEADING] for end in (half, -half))
+        x, y = fronts - rears
+        return np.concatenate((0.5 * (fronts + rears), np.arctan2(y, x)[None]))
 
     def _path(self, lanes: tuple[str, ...]) -> LanePath:
         found = self._paths.get(lanes)
@@ -147,15 +151,15 @@ class LanePaths:
         stations = np.arange(int(line.length) + 1 + (0 if parts[-1].successors else _TAIL), dtype=np.float64)
         which = np.searchsorted(starts, stations, side="right") - 1
         poses = line.poses(stations)
-        rules = np.stack(
+        columns = np.stack(
             [
+                *poses.T,
+                np.array([part.width / 2.0 for part in parts])[which],
                 self._bend_speeds(poses[:, _HEADING]),
                 np.array([part.speed_limit for part in parts])[which],
-                np.array([part.width / 2.0 for part in parts])[which],
-                np.concatenate(([0.0], np.abs(np.diff(poses[:, _HEADING])).cumsum())),
             ]
         )
-        return LanePath(lanes, tuple(starts.tolist()), self._stored(poses, rules), len(poses))
+        return LanePath(lanes, tuple(starts.tolist()), self._stored(columns), len(poses))
 
     def _bend_speeds(self, headings: Floats) -> Floats:
         """The speed at each row that leaves time to brake for the bends ahead [m/s]."""
@@ -168,18 +172,15 @@ class LanePaths:
         speeds: Floats = np.sqrt(np.minimum.accumulate((squares + braking)[::-1])[::-1] - braking)
         return speeds
 
-    def _stored(self, poses: Floats, rules: Floats) -> int:
-        first, self._used = self._used, self._used + len(poses)
-        if self._used > len(self._poses):
-            more = 2 * self._used - first
-            self._poses = np.concatenate([self._poses[:first], np.empty((more, 3))])
-            self._rules = np.concatenate([self._rules[:, :first], np.empty((4, more))], axis=1)
-        self._poses[first : self._used] = poses
-        self._rules[:, first : self._used] = rules
+    def _stored(self, columns: Floats) -> int:
+        first, self._used = self._used, self._used + columns.shape[1]
+        if self._used > self._table.shape[1]:
+            self._table = np.concatenate((self._table[:, :first], np.empty((_ROWS, 2 * self._used - first))), axis=1)
+        self._table[:, first : self._used] = columns
         return first
 
 
-def _extents(paths: Sequence[LanePath]) -> tuple[Integers, Integers]:
-    """First row in the table, and last row counted from it (h,), (h,)."""
-    extents = np.array([(path.first, path.count - 1) for path in paths], dtype=np.int64).reshape(-1, 2)
-    return extents[:, 0], extents[:, 1]
+def stretches_of(paths: Sequence[LanePath]) -> Stretches:
+    """Where `paths` (h,) lie in the table."""
+    ends = np.array([(path.first, path.first + path.count - 1) for path in paths], dtype=np.int64).reshape(-1, 2)
+    return Stretches(ends[:, 0], ends[:, 1])

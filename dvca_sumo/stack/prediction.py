@@ -17,10 +17,10 @@ from dvca_sumo.stack.hypotheses import Hypotheses, message_of
 from dvca_sumo.stack.lane_changes import LaneChangeConfig, LaneChanges, lateral_speeds
 from dvca_sumo.stack.lane_following import Candidates, LaneFollowing, LaneMatchConfig, Movers
 from dvca_sumo.stack.lane_motion import LaneMotion, MotionModelConfig
-from dvca_sumo.stack.lane_paths import LanePath, LanePaths
+from dvca_sumo.stack.lane_paths import LanePaths, Stretches, stretches_of
 from dvca_sumo.stack.walking import Walking, WalkingConfig
 
-_CUTS = 0.1  # [m] by which a body has to cut a corner of its lane for that to be told
+_LONG = 7.0  # [m] longer bodies (buses, lorries) cut the corners of their lanes noticeably
 # Comparing an array with an enumeration's member costs numpy ten times as much as with a number.
 _VEHICLE, _BICYCLE, _PERSON = int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 
@@ -74,10 +74,10 @@ class MapPrediction:
         walkers = ((tracked.classes == _PERSON) & (speeds >= self._config.standing_speed)).nonzero()[0]
         if walkers.size:
             parts.append(self._walking.hypotheses(tracked, walkers))
-        is_left = np.ones(len(speeds), dtype=np.bool_)
+        is_done = np.zeros(len(speeds), dtype=np.bool_)
         for part in parts:
-            is_left[part.owners] = False
-        parts.append(self._straight_on(tracked, is_left.nonzero()[0], speeds))
+            is_done[part.owners] = True
+        parts.append(self._straight_on(tracked, (~is_done).nonzero()[0], speeds))
         return message_of(tracked, *parts)
 
     def _trends(self, tracks: list[int], speeds: list[float], elapsed: float) -> Floats:
@@ -126,40 +126,39 @@ class MapPrediction:
         owners, paths, probabilities, places = candidates
         if not len(owners):
             return Hypotheses(owners, probabilities, np.empty((0, len(PREDICTION_TIMES), 3)), [])
-        own = speeds[owners]
-        stations = self._motion.travelled(paths, places.stations, own, trends[owners], float(reaches[owners].max()))
+        own, along = speeds[owners], stretches_of(paths)
+        stations = self._motion.travelled(along, places.stations, own, trends[owners], float(reaches[owners].max()))
         is_bicycle = tracked.classes[owners] == _BICYCLE
         keeps_side = is_bicycle & (np.abs(places.offsets) <= places.half_widths)
         lengths = tracked.boxes[owners, 3]
-        turned = self._paths.turned(paths, places.stations - 0.5 * lengths, stations[:, -1] + 0.5 * lengths)
-        bent = (turned * lengths > 8.0 * _CUTS).nonzero()[0]  # an arc's height over its chord is length * angle / 8
-        bent_paths, beside = [paths[row] for row in bent.tolist()], places.offsets
-        if bent_paths:
+        long = (lengths > _LONG).nonzero()[0]
+        long_paths, beside = Stretches(along.first[long], along.last[long]), places.offsets
+        if long.size:
             beside = beside.copy()
-            beside[bent] -= self._cut(bent_paths, places.stations[bent], lengths[bent])
+            beside[long] -= self._cut(long_paths, places.stations[long], lengths[long])
         targets = np.where(keeps_side, beside, 0.0)
         offsets, slants = self._motion.settled(beside, targets, drifts, own)
-        poses = self._paths.poses(paths, stations, offsets)
-        if bent_paths:
-            poses[bent] = self._paths.bodies(bent_paths, stations[bent], offsets[bent], lengths[bent])
-        poses[:, :, 2] = wrapped_all(poses[:, :, 2] + slants)
-        poses[:, 0] = tracked.boxes[owners, :3]
+        poses = self._paths.poses(along, stations, offsets)
+        if long.size:
+            poses[:, long] = self._paths.bodies(long_paths, stations[long], offsets[long], lengths[long])
+        poses[2] = wrapped_all(poses[2] + slants)
+        poses[:, :, 0] = tracked.boxes[owners, :3].T
         ends = zip(paths, stations[:, 0].tolist(), stations[:, -1].tolist(), strict=True)
         lanes = [path.lanes_between(start, end) for path, start, end in ends]
-        return _told_apart(Hypotheses(owners, probabilities, poses, lanes))
+        return _told_apart(Hypotheses(owners, probabilities, poses.transpose(1, 2, 0), lanes))
 
-    def _cut(self, paths: list[LanePath], stations: Floats, lengths: Floats) -> Floats:
-        """How far to the left of its path the middle of a body is where its ends are on it (h,) [m]."""
+    def _cut(self, paths: Stretches, stations: Floats, lengths: Floats) -> Floats:
+        """How far to the left of its path the middle of a long body is where its ends are on it (h,) [m]."""
         here, none = stations[:, None], np.zeros((len(stations), 1))
-        on_path = self._paths.poses(paths, here, none)[:, 0]
-        gaps = self._paths.bodies(paths, here, none, lengths)[:, 0] - on_path
-        cut: Floats = gaps[:, 1] * np.cos(on_path[:, 2]) - gaps[:, 0] * np.sin(on_path[:, 2])
+        x, y, headings = self._paths.poses(paths, here, none)[:, :, 0]
+        middle_x, middle_y, _ = self._paths.bodies(paths, here, none, lengths)[:, :, 0]
+        cut: Floats = (middle_y - y) * np.cos(headings) - (middle_x - x) * np.sin(headings)
         return cut
 
     def _straight_on(self, tracked: TrackedObjects, rows: Integers, speeds: Floats) -> Hypotheses:
         """Constant velocity, which is none for a standing vehicle or obstacle."""
         poses = np.empty((len(rows), len(PREDICTION_TIMES), 3))
-        poses[:] = tracked.boxes[rows, None, :3]
+        poses[:] = tracked.boxes.take(rows, axis=0)[:, None, :3]
         stands = (speeds < self._config.standing_speed) & (tracked.classes != _PERSON)
         moves = (~stands[rows]).nonzero()[0]
         if moves.size:

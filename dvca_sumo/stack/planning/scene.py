@@ -82,10 +82,10 @@ def scene_in(
     slowest = _slowest_moving(ids, is_person.tolist(), stood, config)
     standing = _foreseen_speeds(predicted, counts) < np.array(slowest)
     counts &= ~standing[predicted.owners]
-    stays = np.ones(len(standing), dtype=np.bool_)
-    stays[predicted.owners[counts]] = False
-    rows, still = counts.nonzero()[0], stays.nonzero()[0]
-    poses = predicted.poses[rows]
+    goes = np.zeros(len(standing), dtype=np.bool_)
+    goes[predicted.owners[counts]] = True
+    rows, still = counts.nonzero()[0], (~goes).nonzero()[0]
+    poses = predicted.poses.take(rows, axis=0)
     if len(rows) > _FEW:
         around = _is_around(window, poses)
         rows, poses = rows[around], poses[around]
