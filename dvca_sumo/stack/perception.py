@@ -63,17 +63,17 @@ class Tracker:
         config, seen = self._config, detections.boxes
         cos, sin = math.cos(localization.heading), math.sin(localization.heading)
         x, y = seen[:, 0], seen[:, 1]
-        ways = np.empty((len(seen), 2))
-        ways[:, 0], ways[:, 1] = cos * x - sin * y, sin * x + cos * y
+        east, north = cos * x - sin * y, sin * x + cos * y
         distances = np.maximum(np.hypot(x, y), 1e-6)
-        boxes = seen.copy()
-        boxes[:, 0], boxes[:, 1] = ways[:, 0] + localization.x, ways[:, 1] + localization.y
+        directions, boxes = np.empty((len(seen), 2)), seen.copy()
+        directions[:, 0], directions[:, 1] = east / distances, north / distances
+        boxes[:, 0], boxes[:, 1] = east + localization.x, north + localization.y
         boxes[:, 2] = wrapped_all(seen[:, 2] + localization.heading)
         return Measurements(
             boxes,
             detections.classes,
             (config.position_sigma + config.position_sigma_per_metre * distances) ** 2,
-            ways / distances[:, None],
+            directions,
             detections.radial_speeds,
             config.radial_speed_sigma**2,
         )
@@ -112,17 +112,16 @@ class Tracker:
         return confirmed
 
     def _told(self, confirmed: Flags, signals: dict[str, SignalColour], time: float) -> TrackedObjects:
-        tracks = self._tracks
-        means, classes = tracks.means[confirmed], tracks.classes[confirmed]
+        tracks, rows = self._tracks, confirmed.nonzero()[0]
+        means, classes, forms = tracks.means.take(rows, axis=0), tracks.classes[rows], tracks.forms.take(rows, axis=0)
         velocities = means[:, 2:]
         speeds = np.hypot(velocities[:, 0], velocities[:, 1])
         is_still = (speeds < self._config.still_speed) | (classes == _STATIC)
-        forms = tracks.forms[confirmed]
         if self._config.swaps_sides:
             forms = forms[:, [0, 2, 1]]
         return TrackedObjects(
             time,
-            tracks.ids[confirmed],
+            tracks.ids[rows],
             classes,
             np.concatenate([means[:, :2], forms], axis=1),
             np.where(is_still[:, None], 0.0, velocities),
@@ -163,10 +162,10 @@ def mutual_nearest(costs: Floats, gate: float) -> tuple[Integers, Integers]:
 
 def _selected(found: Measurements, rows: Integers) -> Measurements:
     return Measurements(
-        found.boxes[rows],
+        found.boxes.take(rows, axis=0),
         found.classes[rows],
         found.variances[rows],
-        found.directions[rows],
+        found.directions.take(rows, axis=0),
         found.radial_speeds[rows],
         found.radial_variance,
     )

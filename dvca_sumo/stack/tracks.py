@@ -61,7 +61,8 @@ class Tracks:
 
     def predict(self, dt: float) -> None:
         """Move all tracks on by dt [s]."""
-        transition = np.array([[1.0, 0.0, dt, 0.0], [0.0, 1.0, 0.0, dt], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+        transition = _STATE.copy()
+        transition[0, 2] = transition[1, 3] = dt
         a, b, c = dt**4 / 4.0, dt**3 / 2.0, dt**2
         noise = np.array([[a, 0.0, b, 0.0], [0.0, a, 0.0, b], [b, 0.0, c, 0.0], [0.0, b, 0.0, c]])
         variances = self._accelerations[self.classes] ** 2
@@ -71,8 +72,8 @@ class Tracks:
 
     def update(self, rows: Integers, found: Measurements, time: float) -> None:
         """Correct track rows[k] by measurement k."""
-        velocities = self.means[rows, 2:]
-        speeds = np.hypot(velocities[:, 0], velocities[:, 1])
+        means = self.means.take(rows, axis=0)
+        speeds = np.hypot(means[:, 2], means[:, 3])
         hits, votes = self.hits.copy(), self.votes.copy()
         hits[rows] += 1
         votes[rows, found.classes] += 1
@@ -80,9 +81,9 @@ class Tracks:
         last_hits[rows] = time
         self.hits, self.votes, self.classes, self.last_hits = hits, votes, votes.argmax(axis=1), last_hits
         self._update_forms(rows, found, speeds)
-        self._update_motion(rows, found, speeds)
+        self._update_motion(rows, found, means, speeds)
 
-    def _update_motion(self, rows: Integers, found: Measurements, speeds: Floats) -> None:
+    def _update_motion(self, rows: Integers, found: Measurements, means: Floats, speeds: Floats) -> None:
         """Kalman update by position, radial speed and, for what rolls, no velocity across the heading."""
         count = len(rows)
         headings = found.boxes[:, 2]
@@ -100,7 +101,7 @@ class Tracks:
         noise[:, 2] = found.radial_variance
         noise[:, 3] = (self._config.sideways_sigma + self._config.sideways_share * speeds) ** 2
 
-        means, covariances = self.means[rows], self.covariances[rows]
+        covariances = self.covariances.take(rows, axis=0)
         cross = observation @ covariances
         spread = cross @ observation.transpose(0, 2, 1) + noise[:, :, None] * _STATE
         gain = np.linalg.solve(spread, cross).transpose(0, 2, 1)
@@ -118,10 +119,11 @@ class Tracks:
         gains = np.empty((len(rows), 3))
         gains[:, 0] = np.maximum(shares, floors)
         gains[:, 1:] = np.maximum(shares, config.size_gain)[:, None]
-        change = found.boxes[:, 2:] - self.forms[rows]
+        known = self.forms.take(rows, axis=0)
+        change = found.boxes[:, 2:] - known
         change[:, 0] = wrapped_all(change[:, 0])
         forms = self.forms.copy()
-        forms[rows] += gains * change
+        forms[rows] = known + gains * change
         forms[:, 0] = wrapped_all(forms[:, 0])
         self.forms = forms
 
