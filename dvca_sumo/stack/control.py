@@ -134,13 +134,11 @@ class TrackingController:
         error = wrapped(localization.heading - heading)
         distance = max(config.min_settling_distance, speed * config.settling_time)
         # Regulated to the heading at which offset and heading terms cancel: that one is limited.
-        approach = offset / (_SQRT2 * distance)
-        approach = min(config.max_approach_angle, max(-config.max_approach_angle, approach))
+        approach = _limited(offset / (_SQRT2 * distance), config.max_approach_angle)
         ahead = _place(track.stations, station + speed * config.steering_preview)
         curvature = _at(ahead, track.curvatures) - _SQRT2 / distance * (error + approach)
         most = config.max_lateral_acceleration / max(1.0, speed * speed)
-        steering = math.atan(self._wheelbase * min(most, max(-most, curvature)))
-        return min(config.max_steering, max(-config.max_steering, steering))
+        return _limited(math.atan(self._wheelbase * _limited(curvature, most)), config.max_steering)
 
     def _acceleration(self, speed: float, wanted: float, behind: float, track: _Track, age: float) -> float:
         config = self._config
@@ -150,14 +148,14 @@ class TrackingController:
                 self._integral = 0.0
                 return self._halting(speed, behind)
         error = wanted - speed
-        position = min(config.max_position_error, max(-config.max_position_error, behind))
+        position = _limited(behind, config.max_position_error)
         ahead = _at(_place(track.times, age + config.acceleration_preview), track.accelerations)
         direct = ahead + config.speed_gain * error + config.position_gain * position + self._integral
         limited = min(config.max_acceleration, max(-config.max_braking, direct))
         # Anti-windup: what the actuator cannot give is not asked for more and more.
         if limited == direct:
             change = config.speed_integral_gain * error * config.period
-            self._integral = min(config.max_integral, max(-config.max_integral, self._integral + change))
+            self._integral = _limited(self._integral + change, config.max_integral)
         return limited
 
     def _halting(self, speed: float, remaining: float) -> float:
@@ -169,6 +167,13 @@ class TrackingController:
         room = remaining - 0.5 * config.acceleration_preview * speed
         needed = 0.5 * speed * speed / room if room > 0.0 else config.stop_braking + config.speed_gain * speed
         return -min(config.max_braking, needed)
+
+
+def _limited(value: float, most: float) -> float:
+    """The value, no farther from 0 than `most`; what is not a number counts as `-most`."""
+    if value > -most:
+        return min(most, value)
+    return -most
 
 
 def _along(pose: Pose, localization: LocalizationEstimate) -> float:
