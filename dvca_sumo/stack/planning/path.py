@@ -101,7 +101,7 @@ def path_along(
 ) -> Path:
     """From the start state onto the reference line, or onto the plateaus where there are any."""
     count = window.rows.shape[1] - BEHIND
-    offsets, slopes, bends = _profile(lateral, plateaus, start.speed, count, config)
+    (offsets, slopes), bend = _profile(lateral, plateaus, start.speed, count, config)
     line = window.rows[:6, BEHIND:]
     _, _, cosines, sines, line_headings, line_curvatures = line
     points = np.empty((2, count))
@@ -115,7 +115,7 @@ def path_along(
     tangents = slopes / scale
     cosines_to_line = 1.0 / np.sqrt(1.0 + tangents * tangents)
     angles, turns = np.arctan(tangents), np.zeros(count)
-    turns[0] = bends[0] * cosines_to_line[0] * cosines_to_line[0] / scale[0]
+    turns[0] = bend * cosines_to_line[0] * cosines_to_line[0] / scale[0]
     turns[1:-1] = 0.5 * (angles[2:] - angles[:-2])  # what they are at a row says little of moves as short as rows are
     arcs = np.zeros(count)
     np.hypot(*(points[:, 1:] - points[:, :-1])).cumsum(out=arcs[1:])
@@ -126,20 +126,22 @@ def path_along(
     return Path(x, y, headings, (line_curvatures + turns) * cosines_to_line / scale, arcs, *sides)
 
 
-def _profile(lateral: Lateral, plateaus: Sequence[Plateau], speed: float, count: int, config: PlanningConfig) -> Floats:
-    """Offset, slope and bend at stations 0 ... count-1 (3, count): holds and blends between them."""
-    profile = np.zeros((3, count))
+def _profile(
+    lateral: Lateral, plateaus: Sequence[Plateau], speed: float, count: int, config: PlanningConfig
+) -> tuple[Floats, float]:
+    """Offset and slope at stations 0 ... count-1 (2, count), by holds and blends between; the bend at station 0."""
+    profile, bend = np.zeros((2, count)), 0.0
     position, state = 0.0, lateral
     for begin, end, target in _blends(lateral, plateaus, speed, config):
         first, last = math.ceil(begin), min(math.ceil(end), count)
         profile[0, math.ceil(position) : first] = state.offset
         if first < last:
-            profile[:, first:last] = _blend(
-                state, target, end - begin, np.arange(first, last, dtype=np.float64) - begin
-            )
+            along = np.arange(first, last, dtype=np.float64) - begin
+            profile[:, first:last], bent = _blend(state, target, end - begin, along)
+            bend = bend if first else bent
         position, state = end, Lateral(target, 0.0, 0.0)
     profile[0, math.ceil(position) :] = state.offset
-    return profile
+    return profile, bend
 
 
 def _blends(
@@ -174,19 +176,20 @@ def _blends(
     return blends
 
 
-def _blend(state: Lateral, target: float, length: float, along: Floats) -> Floats:
-    """The quintic of least jerk from `state` to rest at `target` after `length`, at distances `along` (n,).
+def _blend(state: Lateral, target: float, length: float, along: Floats) -> tuple[Floats, float]:
+    """The quintic of least jerk from `state` to rest at `target` after `length`.
 
-    Offset, slope and bend there (3, n).
+    Offset and slope at distances `along` (2, n), and the bend at the first of them.
     """
     first, second = state.slope * length, 0.5 * state.bend * length * length
     third, fourth, fifth = _upper_terms(target - state.offset, first, second)
     u = along / length
-    blend = np.empty((3, len(u)))
+    blend = np.empty((2, len(u)))
     blend[0] = state.offset + u * (first + u * (second + u * (third + u * (fourth + u * fifth))))
     blend[1] = (first + u * (2.0 * second + u * (3.0 * third + u * (4.0 * fourth + u * (5.0 * fifth))))) / length
-    blend[2] = (2.0 * second + u * (6.0 * third + u * (12.0 * fourth + u * (20.0 * fifth)))) / (length * length)
-    return blend
+    begin = float(u[0])
+    bend = 2.0 * second + begin * (6.0 * third + begin * (12.0 * fourth + begin * (20.0 * fifth)))
+    return blend, bend / (length * length)
 
 
 def _upper_terms(rise: float, first: float, second: float) -> tuple[float, float, float]:

@@ -141,6 +141,8 @@ class Reference:
         line_rows = table[[_X, _Y, _COS, _SIN]]
         table[_SWEPT_LEFT:] = swept(table[:2], table[_HEADING], line_rows, shape)
         self._table = table
+        limits = np.pad(table[_LIMIT], (0, _OUTLOOK - 1), mode="edge")
+        self._fastest = np.lib.stride_tricks.sliding_window_view(limits, _OUTLOOK).max(axis=1)
         self._steps = table[:, 1:] - table[:, :-1]
         self._end = line.length + _BEYOND - _OUTLOOK
 
@@ -165,8 +167,7 @@ class Reference:
 
     def fastest(self, station: float) -> float:
         """The highest speed limit within the next _OUTLOOK [m/s]."""
-        first = int(station) + BEHIND + 2
-        return float(self._table[_LIMIT, first : first + _OUTLOOK].max())
+        return float(self._fastest[int(station) + BEHIND + 2])
 
     def window(self, station: float, length: float) -> Window:
         """From BEHIND before `station` to at least `length` past it, interpolated linearly."""

@@ -68,8 +68,11 @@ class Profile(msgspec.Struct, frozen=True, eq=False):
         s, v, a = self.arcs[:-1], self.speeds[:-1], self.accelerations[:-1]
         half, rise = 0.5 * STEP, 0.5 * (self.accelerations[1:] - a)
         accelerations[1::2] = a + rise
-        is_stopping = (v > 0.0) & (self.speeds[1:] == 0.0)
-        speeds[1::2] = np.maximum(np.where(is_stopping, 0.5 * v - _STANDSTILL, v + half * (a + 0.5 * rise)), 0.0)
+        middles = v + half * (a + 0.5 * rise)
+        if np.count_nonzero(self.speeds) < len(self.speeds):
+            is_stopping = (v > 0.0) & (self.speeds[1:] == 0.0)
+            middles[is_stopping] = 0.5 * v[is_stopping] - _STANDSTILL
+        speeds[1::2] = np.maximum(middles, 0.0)
         arcs[1::2] = np.minimum(np.maximum(s + half * (v + half * (0.5 * a + rise / 6.0)), s), self.arcs[1:])
         return arcs, speeds, accelerations
 
