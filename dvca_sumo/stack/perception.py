@@ -106,7 +106,7 @@ class Tracker:
         alive = np.where(
             confirmed, time - tracks.last_hits <= config.coast_time + 1e-6, tracks.sweeps < config.confirming_sweeps
         )
-        if not alive.all():
+        if np.count_nonzero(alive) < len(alive):
             tracks.keep(alive)
             confirmed = confirmed[alive]
         return confirmed

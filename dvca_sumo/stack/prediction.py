@@ -77,7 +77,9 @@ class MapPrediction:
         is_done = np.zeros(len(speeds), dtype=np.bool_)
         for part in parts:
             is_done[part.owners] = True
-        parts.append(self._straight_on(tracked, (~is_done).nonzero()[0], speeds))
+        rest = (~is_done).nonzero()[0]
+        if rest.size:
+            parts.append(self._straight_on(tracked, rest, speeds))
         return message_of(tracked, *parts)
 
     def _trends(self, tracks: list[int], speeds: list[float], elapsed: float) -> Floats:

@@ -246,11 +246,12 @@ def _is_behind(graph: Graph, rows: Integers, shape: VehicleShape) -> Flags:
 
 def _passing_speeds(graph: Graph, config: PlanningConfig) -> list[tuple[int, float, float]]:
     """Futures that are passed close by now, as rows, at which speed [m/s], and from how far before them on [m]."""
-    scene, gaps = graph.scene, graph.gaps[:, 0]
+    scene, nearest = graph.scene, max(config.person_slow_gap, config.object_slow_gap)
     speeds = []
-    for row in ((gaps >= 0.0) & (gaps < max(config.person_slow_gap, config.object_slow_gap))).nonzero()[0].tolist():
-        owner, gap = scene.owners[row], float(gaps[row])
-        is_person = scene.classes[owner] == _PERSON
+    for row, gap in enumerate(graph.gaps[:, 0].tolist()):
+        if not 0.0 <= gap < nearest:
+            continue
+        owner, is_person = scene.owners[row], scene.is_person[row]
         is_slow = scene.speeds[owner] < _SLOW_MOVER and scene.classes[owner] != _VEHICLE
         if gap < (config.person_slow_gap if is_person else config.object_slow_gap) and (
             is_slow or scene.is_standing[owner]
