@@ -141,7 +141,8 @@ def _is_around(window: Window, poses: Floats) -> Flags:
 def extents(window: Window, boxes: Floats, poses: Floats, owners: Integers) -> Extents:
     """Of hypotheses (h, t, 3) of the boxes (n, 5) whose rows their `owners` (h,) are."""
     hypotheses, times, _ = poses.shape
-    placed = _placed(window, poses.reshape(-1, 3), boxes[owners, 3:].repeat(times, axis=0))
+    halves = 0.5 * boxes[owners, 3:].T
+    placed = _placed(window, poses.reshape(-1, 3), halves.repeat(times, axis=1))
     return Extents(*placed.reshape(5, hypotheses, times))
 
 
@@ -151,8 +152,9 @@ def _extents(
     """Of boxes (n, 5) now; and of their futures: hypotheses (h, t, 3), then one for each of `still` that stays."""
     count, (moving, times, _) = len(boxes), poses.shape
     flat = np.concatenate((boxes[:, :3], poses.reshape(-1, 3)))
-    sizes = np.concatenate((boxes[:, 3:], boxes[owners, 3:].repeat(times, axis=0)))
-    placed = _placed(window, flat, sizes)
+    halves = 0.5 * boxes[:, 3:].T
+    halves = np.concatenate((halves, halves.take(owners, axis=1).repeat(times, axis=1)), axis=1)
+    placed = _placed(window, flat, halves)
     now = placed[:, :count]
     futures = np.empty((5, moving + len(still), times))
     futures[:, :moving] = placed[:, count:].reshape(5, moving, times)
@@ -160,14 +162,14 @@ def _extents(
     return Extents(*now), Extents(*futures)
 
 
-def _placed(window: Window, poses: Floats, sizes: Floats) -> Floats:
-    """The fields of `Extents` (5, k) of boxes at `poses` (k, 3), of `sizes` (k, 2)."""
+def _placed(window: Window, poses: Floats, halves: Floats) -> Floats:
+    """The fields of `Extents` (5, k) of boxes at `poses` (k, 3), of half lengths and half widths `halves` (2, k)."""
     placed = np.empty((5, len(poses)))
     placed[0], placed[1], headings = window.project(poses[:, :2])
-    halves = 0.5 * sizes
+    half_lengths, half_widths = halves
     directions = np.cos(poses[:, 2] - headings)
     cosines, sines = np.abs(directions), np.sqrt(1.0 - directions * directions)
-    placed[2] = halves[:, 0] * cosines + halves[:, 1] * sines
-    placed[3] = halves[:, 0] * sines + halves[:, 1] * cosines
+    placed[2] = half_lengths * cosines + half_widths * sines
+    placed[3] = half_lengths * sines + half_widths * cosines
     placed[4] = directions
     return placed
