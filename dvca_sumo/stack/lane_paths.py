@@ -18,13 +18,13 @@ from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.continuations import Continuations
 
-# Rows of the table. What is looked up together lies together.
+# Rows of the table; what is looked up together is adjacent.
 _X, _Y, _HEADING, _HALF_WIDTH, _BEND_SPEED, _LIMIT, _ROWS = range(7)
 
 _TAIL = 300  # [m] beyond a dead end or the net's edge, traffic is taken to go straight on
 _LENGTH_STEP = 40.0  # [m] continuations are kept by length in such steps
-_BEND = 2  # rows (metres) to either side over which curvature is taken
-_WINDOW = np.arange(-8, 9)  # rows (metres) around a guessed station that a projection searches
+_BEND = 2  # columns (metres) to either side over which curvature is taken
+_WINDOW = np.arange(-8, 9)  # columns (metres) around a guessed station that a projection searches
 
 
 class LanePath(msgspec.Struct, frozen=True, eq=False):
@@ -162,7 +162,7 @@ class LanePaths:
         return LanePath(lanes, tuple(starts.tolist()), self._stored(columns), len(poses))
 
     def _bend_speeds(self, headings: Floats) -> Floats:
-        """The speed at each row that leaves time to brake for the bends ahead [m/s]."""
+        """The speed at each column that leaves time to brake for the bends ahead [m/s]."""
         if len(headings) <= 2 * _BEND:
             return np.full(len(headings), np.inf)
         turns = np.abs(headings[2 * _BEND :] - headings[: -2 * _BEND]) / (2.0 * _BEND)

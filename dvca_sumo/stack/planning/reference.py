@@ -112,7 +112,7 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         return step + (rows - BEHIND), offsets, headings + turn
 
     def _seen(self, points: Floats, rows: Integers) -> tuple[Floats, Floats, Floats, Floats]:
-        x, y, cosines, sines, headings, curvatures = self.rows[:6].take(rows, axis=1)
+        x, y, cosines, sines, headings, curvatures = self.rows[:6].take(rows, axis=1, mode="clip")
         x = points[:, 0] - x
         y = points[:, 1] - y
         return x * cosines + y * sines, y * cosines - x * sines, curvatures, headings
