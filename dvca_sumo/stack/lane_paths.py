@@ -110,27 +110,24 @@ class LanePaths:
         bends, limits = self._table[_BEND_SPEED:].take(np.minimum(metres, last[:, None]), axis=1)
         return bends, limits
 
-    def poses(self, paths: Stretches, stations: Floats, offsets: Floats) -> Floats:
-        """Poses at `stations` (h, t), moved to the left by `offsets` (h, t): x, y, headings, not wrapped (3, h, t)."""
-        first, last = paths
-        columns = np.minimum(np.maximum(stations.astype(np.int64), 0), (last - first - 1)[:, None])
-        shares = stations - columns
-        columns += first[:, None]
-        table = self._table[: _HEADING + 1]
-        before = table.take(columns, axis=1)
-        poses: Floats = table.take(columns + 1, axis=1)
-        poses -= before
-        poses *= shares
-        poses += before
-        x, y, headings = poses
-        x -= offsets * np.sin(headings)
-        y += offsets * np.cos(headings)
-        return poses
+    def bodies(self, paths: Stretches, stations: Floats, lengths: Floats) -> Floats:
+        """Poses of bodies so long (h,) that both ends follow the path, chords in its bends: x, y, headings (3, h, t).
 
-    def bodies(self, paths: Stretches, stations: Floats, offsets: Floats, lengths: Floats) -> Floats:
-        """As `poses`, of the middles of bodies so long (h,) that both ends follow the path: chords in its bends."""
+        `stations` (h, t) are those of their middles, along the path.
+        """
+        first, last = paths
         half = 0.5 * lengths[:, None]
-        fronts, rears = (self.poses(paths, stations + end, offsets)[:_HEADING] for end in (half, -half))
+        ends = np.concatenate((stations + half, stations - half), axis=1)
+        columns = np.minimum(np.maximum(ends.astype(np.int64), 0), (last - first - 1)[:, None])
+        shares = ends - columns
+        columns += first[:, None]
+        table = self._table[: _Y + 1]
+        before = table.take(columns, axis=1)
+        points: Floats = table.take(columns + 1, axis=1)
+        points -= before
+        points *= shares
+        points += before
+        fronts, rears = points[:, :, : stations.shape[1]], points[:, :, stations.shape[1] :]
         x, y = fronts - rears
         return np.concatenate((0.5 * (fronts + rears), np.arctan2(y, x)[None]))
 

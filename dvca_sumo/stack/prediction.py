@@ -17,10 +17,9 @@ from dvca_sumo.stack.hypotheses import Hypotheses, message_of
 from dvca_sumo.stack.lane_changes import LaneChangeConfig, LaneChanges, lateral_speeds
 from dvca_sumo.stack.lane_following import Candidates, LaneFollowing, LaneMatchConfig, Movers
 from dvca_sumo.stack.lane_motion import LaneMotion, MotionModelConfig
-from dvca_sumo.stack.lane_paths import LanePaths, Stretches, stretches_of
+from dvca_sumo.stack.lane_paths import LanePaths, stretches_of
 from dvca_sumo.stack.walking import Walking, WalkingConfig
 
-_LONG = 7.0  # [m] longer bodies (buses, lorries) cut the corners of their lanes noticeably
 # Comparing an array with an enumeration's member costs numpy ten times as much as with a number.
 _VEHICLE, _BICYCLE, _PERSON = int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 
@@ -121,7 +120,7 @@ class MapPrediction:
     ) -> Hypotheses:
         """The candidates and lane changes that differ within the horizon.
 
-        Cars seek the lane's centre, bicycles keep their side of it.
+        Both ends of a body follow the lane. Cars seek its centre, bicycles keep their side of it.
         """
         drifts = lateral_speeds(candidates, tracked.velocities)
         candidates, drifts = self._changes.added(candidates, drifts, tracked, reaches)
@@ -132,30 +131,19 @@ class MapPrediction:
         stations = self._motion.travelled(along, places.stations, own, trends[owners], float(reaches[owners].max()))
         is_bicycle = tracked.classes[owners] == _BICYCLE
         keeps_side = is_bicycle & (np.abs(places.offsets) <= places.half_widths)
-        lengths = tracked.boxes[owners, 3]
-        long = (lengths > _LONG).nonzero()[0]
-        long_paths, beside = Stretches(along.first[long], along.last[long]), places.offsets
-        if long.size:
-            beside = beside.copy()
-            beside[long] -= self._cut(long_paths, places.stations[long], lengths[long])
-        targets = np.where(keeps_side, beside, 0.0)
-        offsets, slants = self._motion.settled(beside, targets, drifts, own)
-        poses = self._paths.poses(along, stations, offsets)
-        if long.size:
-            poses[:, long] = self._paths.bodies(long_paths, stations[long], offsets[long], lengths[long])
-        poses[2] = wrapped_all(poses[2] + slants)
-        poses[:, :, 0] = tracked.boxes[owners, :3].T
+        boxes = tracked.boxes.take(owners, axis=0)
+        poses = self._paths.bodies(along, stations, boxes[:, 3])
+        x, y, headings = poses
+        cosines, sines = np.cos(headings), np.sin(headings)
+        beside = (boxes[:, 1] - y[:, 0]) * cosines[:, 0] - (boxes[:, 0] - x[:, 0]) * sines[:, 0]
+        offsets, slants = self._motion.settled(beside, np.where(keeps_side, beside, 0.0), drifts, own)
+        x -= offsets * sines
+        y += offsets * cosines
+        poses[2] = wrapped_all(headings + slants)
+        poses[:, :, 0] = boxes[:, :3].T
         ends = zip(paths, stations[:, 0].tolist(), stations[:, -1].tolist(), strict=True)
         lanes = [path.lanes_between(start, end) for path, start, end in ends]
         return _told_apart(Hypotheses(owners, probabilities, poses.transpose(1, 2, 0), lanes))
-
-    def _cut(self, paths: Stretches, stations: Floats, lengths: Floats) -> Floats:
-        """How far to the left of its path the middle of a long body is where its ends are on it (h,) [m]."""
-        here, none = stations[:, None], np.zeros((len(stations), 1))
-        x, y, headings = self._paths.poses(paths, here, none)[:, :, 0]
-        middle_x, middle_y, _ = self._paths.bodies(paths, here, none, lengths)[:, :, 0]
-        cut: Floats = (middle_y - y) * np.cos(headings) - (middle_x - x) * np.sin(headings)
-        return cut
 
     def _straight_on(self, tracked: TrackedObjects, rows: Integers, speeds: Floats) -> Hypotheses:
         """Constant velocity, which is none for a standing vehicle or obstacle."""
