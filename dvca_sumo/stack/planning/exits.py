@@ -4,13 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, VehicleShape
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.scene import Flags
 from dvca_sumo.stack.planning.st_graph import Graph
 
-_PERSON = int(ObjectClass.PEDESTRIAN)
 _SOON = int(np.searchsorted(PREDICTION_TIMES, 3.0))
 _CREEPS = 3.0  # [m] within 3 s: who gets no further, and is no faster now, may stop for good
 _BRAKING = 4.0  # [m/s^2] is as much as is braked for it
@@ -36,10 +35,10 @@ def ahead(graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfi
     ways = np.where(rows < scene.moving, graph.low[rows, _SOON] - graph.low[rows, 0], -np.inf)
     ways[_walks_off(rows, graph, speed, shape, config)] = np.inf
     slowest = np.argsort(ways, kind="stable")
-    owners, firsts = np.unique(scene.owners[rows[slowest]], return_index=True)
-    chosen = slowest[firsts]
-    rears, fronts = graph.low[rows[chosen], 0] - shape.front, graph.high[rows[chosen], 0] - shape.front
-    return Ahead(rears, fronts, ways[chosen] < _CREEPS, scene.classes[owners] != _PERSON)
+    _, firsts = np.unique(scene.owners[rows[slowest]], return_index=True)
+    rows, ways = rows[slowest[firsts]], ways[slowest[firsts]]
+    rears, fronts = graph.low[rows, 0] - shape.front, graph.high[rows, 0] - shape.front
+    return Ahead(rears, fronts, ways < _CREEPS, ~scene.is_person[rows])
 
 
 def _walks_off(rows: Integers, graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfig) -> Flags:
@@ -48,7 +47,7 @@ def _walks_off(rows: Integers, graph: Graph, speed: float, shape: VehicleShape, 
     to_go = np.maximum(graph.low[rows, 0] - shape.front, 0.0)
     arrivals = (np.sqrt(speed * speed + 2.0 * config.acceleration * to_go) - speed) / config.acceleration
     leaves = (last < len(scene.times) - 1) & (scene.times[last] < arrivals)
-    off: Flags = leaves & (scene.classes[scene.owners[rows]] == _PERSON)
+    off: Flags = leaves & scene.is_person[rows]
     return off
 
 

@@ -129,8 +129,8 @@ def _at_kerbs(graph: Graph, views: list[LineView], crossings: Sequence[Crossing]
     As rows of the graph.
     """
     scene, still = graph.scene, slice(graph.scene.moving, None)
-    stands = scene.classes[scene.owners[still]] == _PERSON
-    stands &= (graph.gaps[still, 0] > 0.0) & (graph.gaps[still, 0] < config.crossing_margin)
+    gaps = graph.gaps[still, 0]
+    stands = scene.is_person[still] & (gaps > 0.0) & (gaps < config.crossing_margin)
     if not stands.any():
         return []
     closed = frozenset().union(*(view.line.crosses for view in views if _is_green(view)))

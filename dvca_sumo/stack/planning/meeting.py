@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from dvca_sumo.messages import ObjectClass, VehicleShape
+from dvca_sumo.messages import VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView, has_priority
 from dvca_sumo.stack.planning.reference import BEHIND
@@ -14,7 +14,6 @@ from dvca_sumo.stack.planning.scene import ALONG, SOON, SOON_TIME, Flags
 from dvca_sumo.stack.planning.speed import HARD_GAP, STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import PRESENT, Graph
 
-_PERSON = int(ObjectClass.PEDESTRIAN)
 _SPEEDS_UP = 0.4  # [m/s] faster over the next second than now
 _CUTS_IN = 0.5  # [m] moved sideways before the meeting: the other comes into our lane, not we into theirs
 _OFF_LANE = 0.5  # [m] of the body beyond the edge of its lane, by the line, not by what it swerves for
@@ -90,7 +89,7 @@ class Meetings:
         An ego that hardly moves does not get away from a vehicle any more; standing, it is seen and driven around.
         """
         config, scene, speed = self._config, graph.scene, float(profile.speeds[0])
-        if scene.classes[scene.owners[row]] != _PERSON:
+        if not scene.is_person[row]:
             is_met = entry < config.soon and scene.probabilities[row] >= config.likely
             is_caught = is_met and speed < config.standing_speed and not self._passes([row], graph, profile, 0.0)[0]
             return self._shape.length if is_caught else 0.0
@@ -136,7 +135,7 @@ class Meetings:
         scene = graph.scene
         near, far = (graph.window.station + float(ends[row, graph.first[row]]) for ends in (graph.low, graph.high))
         told = has_priority(views, near, far, scene.lanes[row])
-        if scene.classes[scene.owners[row]] == _PERSON:
+        if scene.is_person[row]:
             return told is not False or len(scene.lanes[row]) < _STILL_TO_CROSS
         if told is not None:
             return told
@@ -174,7 +173,7 @@ class Meetings:
         """Before the other's way until it is clear; on a junction of `views` at its place, if that is still ahead."""
         config, front = self._config, self._shape.front
         first, last, scene = graph.first[row], graph.last[row], graph.scene
-        is_person = scene.classes[scene.owners[row]] == _PERSON
+        is_person = scene.is_person[row]
         gap = config.person_gap if is_person else config.yield_gap
         if self._joins(row, graph):
             nearest, until = float(graph.low[row, first]), float(scene.times[first])

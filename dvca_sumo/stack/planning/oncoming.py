@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from dvca_sumo.messages import Floats, ObjectClass, VehicleShape
+from dvca_sumo.messages import Floats, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.reference import BEHIND, Window
@@ -12,7 +12,6 @@ from dvca_sumo.stack.planning.scene import ALONG, Extents, Flags, extents
 from dvca_sumo.stack.planning.speed import HARD_GAP, STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import Graph
 
-_PERSON = int(ObjectClass.PEDESTRIAN)
 _RECENT = 4  # last times of a future, over which its speed is taken
 _COMES = 0.5  # [m/s] slower ones are not expected to get there
 _CREEPS = 1.0  # [m/s] of the ego beyond the end of its profile, at least
@@ -35,7 +34,7 @@ def waits(
         futures = extents(window, scene.boxes, scene.poses, scene.owners[: scene.moving])
     directions = futures.directions[: scene.moving]
     comes: Flags = (directions[:, 0] < -ALONG) | (directions[:, -1] < -ALONG)
-    comes &= scene.classes[scene.owners[: scene.moving]] != _PERSON
+    comes &= ~scene.is_person[: scene.moving]
     found = []
     for row in comes.nonzero()[0].tolist():
         spare, is_left = _spare(row, futures, window)
