@@ -28,6 +28,7 @@ from dvca_sumo.world.entry import Entry
 from dvca_sumo.world.footing import Footing
 from dvca_sumo.world.inset import Inset
 from dvca_sumo.world.itinerary import Itinerary
+from dvca_sumo.world.lingering import Lingering
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 from dvca_sumo.world.setback import Setback
 from dvca_sumo.world.signals import Signals
@@ -45,6 +46,8 @@ _INDICATORS = {1: 0b10, 0: 0, -1: 0b1}  # by the side they tell; bits of SUMO's 
 _BRAKE_LIGHT = 0b1000
 _TOLD_ANEW = 0.2  # [m] of difference in length
 _STANDING = 0.1  # [m/s] up to which SUMO's vehicles show their brake lights
+_AT_SIGNAL = 10.0  # [m] before it a vehicle waits for it
+_GOING = "gGoO"  # colours of signals that let go
 _TWO_WHEELED = ("bicycle", "moped", "motorcycle", "scooter")
 
 
@@ -87,8 +90,11 @@ class _Adopted(msgspec.Struct):
     itinerary: Itinerary
     setback: Setback
     inset: Inset
+    lingering: Lingering
     width: float  # [m]
+    fastest: float  # [m/s] that it can drive
     length: float  # [m] of lane that it takes up
+    goes: bool = True  # means to, when it can
 
 
 class Session:
@@ -232,7 +238,10 @@ class Session:
         of.setVehicleClass(entry.ego, entry.vehicle_class)
         of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
         itinerary = Itinerary(entry.edges, of.getRouteID(entry.ego))
-        self._adopted[entry.ego] = _Adopted(itinerary, Setback(), Inset(), entry.width, entry.length)
+        fastest = of.getMaxSpeed(entry.ego)
+        self._adopted[entry.ego] = _Adopted(
+            itinerary, Setback(), Inset(), Lingering(), entry.width, fastest, entry.length
+        )
         self._vehicle(entry.ego)  # the length it has, before SUMO is told what it takes up
         self.watch(entry.ego, radius)
 
@@ -286,6 +295,16 @@ class Session:
         libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
         # SUMO's own would tell what its driver, overruled, meant to do.
         libsumo.vehicle.setSignals(ego, _INDICATORS[indicated] | (_BRAKE_LIGHT if _is_braking(truth) else 0))
+        self._announce(ego, truth.speed)
+
+    def _announce(self, ego: str, speed: float) -> None:
+        """Tell SUMO whether an ego at `speed` [m/s] means to go on: nobody waits for one that does not."""
+        adopted = self._adopted[ego]
+        waits = abs(speed) < _STANDING and not _has_red(ego)
+        goes = not adopted.lingering.is_long(self.time, waits=waits)
+        if goes != adopted.goes:
+            adopted.goes = goes
+            libsumo.vehicle.setMaxSpeed(ego, adopted.fastest if goes else 0.0)
 
     def stretch(self, ego: str, length: float) -> None:
         """Tell SUMO how much lane an ego takes up [m]: its drivers stop that far behind its front."""
@@ -408,6 +427,12 @@ class Session:
             of = libsumo.person
             self._bodies[key] = Body(ObjectClass.PEDESTRIAN, of.getLength(name), of.getWidth(name), 0.0)
         return key
+
+
+def _has_red(vehicle: str) -> bool:
+    """Whether a vehicle that stands does so at a signal that holds it."""
+    ahead = libsumo.vehicle.getNextTLS(vehicle)
+    return bool(ahead) and ahead[0][2] < _AT_SIGNAL and ahead[0][3] not in _GOING
 
 
 def _is_braking(truth: EgoTruth) -> bool:
