@@ -13,42 +13,50 @@ from dvca_sumo.stack.planning.st_graph import Graph
 _SOON = int(np.searchsorted(PREDICTION_TIMES, 3.0))
 _CREEPS = 3.0  # [m] within 3 s: who gets no further, and is no faster now, may stop for good
 _BRAKING = 4.0  # [m/s^2] is as much as is braked for it
+_PASSING = 2.0  # [s] that it takes to pass somebody
 _QUEUED = 2.0  # [m] that those who close up leave to each other
 
 
 class Ahead(NamedTuple):
-    """Who is on the path at present; places are from the ego's front bumper on [m]."""
+    """Who is on the path, or will be; places are from the ego's front bumper on [m]."""
 
     rears: Floats  # (n,)
     fronts: Floats  # (n,)
     stands: Flags  # (n,) or creeps
     is_vehicle: Flags  # (n,)
+    is_there: Flags  # (n,) now
 
 
 def ahead(graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfig) -> Ahead:
-    """Those whom the path meets where they are now: each by the slowest of its futures.
+    """Vehicles on the path at present, and people who are there when an ego at `speed` [m/s] may first get to them.
 
-    People who walk off it before an ego at `speed` [m/s] gets to them do not stand there.
+    Each by the slowest of its futures. Of people who are not there yet, the likely ones count.
     """
-    scene = graph.scene
-    rows = graph.occupied[:, 0].nonzero()[0]
+    scene, occupied = graph.scene, graph.occupied[:, 0].copy()
+    people = scene.is_person.nonzero()[0]
+    if people.size:
+        counts = occupied[people] | (scene.probabilities[people] >= config.likely)
+        occupied[people] = counts & _met(people, graph, speed, shape, config)
+    rows = occupied.nonzero()[0]
     ways = np.where(rows < scene.moving, graph.low[rows, _SOON] - graph.low[rows, 0], -np.inf)
-    ways[_walks_off(rows, graph, speed, shape, config)] = np.inf
     slowest = np.argsort(ways, kind="stable")
     _, firsts = np.unique(scene.owners[rows[slowest]], return_index=True)
     rows, ways = rows[slowest[firsts]], ways[slowest[firsts]]
-    rears, fronts = graph.low[rows, 0] - shape.front, graph.high[rows, 0] - shape.front
-    return Ahead(rears, fronts, ways < _CREEPS, ~scene.is_person[rows])
+    begun = np.array(graph.first, dtype=np.int64)[rows]
+    rears, fronts = graph.low[rows, begun] - shape.front, graph.high[rows, begun] - shape.front
+    return Ahead(rears, fronts, ways < _CREEPS, ~scene.is_person[rows], graph.occupied[rows, 0])
 
 
-def _walks_off(rows: Integers, graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfig) -> Flags:
-    """Whether each future of `rows` (k,) is that of a person who is off the path when the ego may get there: (k,)."""
-    scene, last = graph.scene, np.array(graph.last, dtype=np.int64)[rows]
-    to_go = np.maximum(graph.low[rows, 0] - shape.front, 0.0)
+def _met(rows: Integers, graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfig) -> Flags:
+    """Whether futures `rows` (k,) occupy the path when the ego may first be there, or while it passes: (k,)."""
+    times = graph.scene.times
+    places = graph.low[rows, np.array(graph.first, dtype=np.int64)[rows]]
+    to_go = np.maximum(places - shape.front, 0.0)
     arrivals = (np.sqrt(speed * speed + 2.0 * config.acceleration * to_go) - speed) / config.acceleration
-    leaves = (last < len(scene.times) - 1) & (scene.times[last] < arrivals)
-    off: Flags = leaves & scene.is_person[rows]
-    return off
+    begins = np.minimum(arrivals, times[-1])[:, None]
+    passing = (times >= begins) & (times <= begins + _PASSING)
+    met: Flags = (graph.occupied[rows] & passing).any(axis=1)
+    return met
 
 
 def is_blocked(
@@ -65,7 +73,8 @@ def is_blocked(
     if not view.line.crosses or distance <= 0.0 or speed * speed > 2.0 * _BRAKING * distance:
         return False
     leave = view.exit_distance
-    if (those.stands & ~those.is_vehicle & (those.rears > distance) & (those.rears <= leave)).any():
+    inside = (those.rears > distance) & (those.rears <= leave)
+    if (those.stands & ~those.is_vehicle & those.is_there & inside).any():
         return True
     beyond = those.stands & (those.rears > leave)
     if not beyond.any():

@@ -181,7 +181,7 @@ def nearest_stop(
         usual = float(graph.low[obstacle, 0]) - shape.front - gap
         closer = _closing_up(usual, views, shape, config)
         stops.append(Stop(usual + closer, config.object_gap - closer - _GIVE_AT_OBJECT, label))
-    if views and np.count_nonzero(graph.occupied[:, 0]):
+    if views and np.count_nonzero(graph.occupied):
         those = ahead(graph, speed, shape, config)
         for view in views:
             stops += _before_blocked(view, those, speed, shape, config)
