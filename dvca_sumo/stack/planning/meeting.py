@@ -22,7 +22,7 @@ _STILL_TO_CROSS = 2  # lanes of a person's future: a pavement, then a crossing
 _LEAST_ROOM = 0.1  # [m]
 _SLOW = 4.0  # [m/s] no faster, an ego stops for people who come up to its side: ...
 _BESIDE_PERSON = 1.0  # ... [m] behind its front bumper, and all along it ...
-_BRUSHING = 0.2  # ... for those who would come so near to it [m]
+_BRUSHING = 0.2  # ... for those who would come so near to it, before it has passed them [m]
 _CLEAR_GAP = 0.5  # [m] lengthwise behind somebody who has passed
 
 
@@ -95,8 +95,15 @@ class Meetings:
             return self._shape.length if is_caught else 0.0
         if speed >= _SLOW:
             return 0.0
-        brushes = bool((graph.gaps[row][graph.occupied[row]] < _BRUSHING).any())
-        return self._shape.length if brushes else _BESIDE_PERSON
+        return self._shape.length if self._brushes(row, graph, profile) else _BESIDE_PERSON
+
+    def _brushes(self, row: int, graph: Graph, profile: Profile) -> bool:
+        """Whether somebody comes up to the body, as future `row` has it, while that is still there: one at rest is."""
+        near = graph.occupied[row] & (graph.gaps[row] < _BRUSHING)
+        if profile.speeds[0] < self._config.standing_speed:
+            return bool(near.any())
+        rear = np.interp(graph.scene.times[near], STEP_TIMES, profile.arcs) - self._shape.rear_overhang
+        return bool((rear <= graph.high[row, near]).any())
 
     def _will_wait(self, row: int, entry: float, graph: Graph) -> bool:
         """Whether who has to give way, and is on the path at `entry` [s], may still stop: unless it speeds up."""

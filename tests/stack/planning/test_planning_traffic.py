@@ -203,6 +203,24 @@ def test_person_about_to_use_a_crossing_is_waited_for_before_it() -> None:
 
 
 @pytest.mark.parametrize(
+    ("pace", "is_stopped_for"),
+    [
+        (0.4, False),  # the ego is gone before they are at its side
+        (1.6, True),
+    ],
+)
+def test_slow_ego_drives_on_where_it_is_gone_before_a_person_comes_up_to_its_side(
+    pace: float,
+    is_stopped_for: bool,  # noqa: FBT001
+) -> None:
+    """They step off a crossing's kerb, its front past."""
+    comes = person(3, 21.9, -2.1, heading=UP, speed=pace)
+    driven = drive(road(crossings=[Crossing("c", 20.0, 24.0)]), 2.0, station=20.0, speed=2.4, actors=[comes])
+    assert bool(driven.speeds.min() < 2.0) is is_stopped_for
+    assert is_stopped_for or driven.clearances.min() > 0.2
+
+
+@pytest.mark.parametrize(
     ("lanes", "yields_to", "is_waited_for"),
     [
         (("pavement", "c"), frozenset({"c"}), True),  # about to use a crossing where people go first
@@ -608,6 +626,17 @@ def test_a_junction_is_entered_while_people_walk_off_the_road_beyond_it(
     driven = drive(road(stop_lines=[line]), 3.0, speed=8.0, station=70.0, actors=[walker])
     assert ("stop exit occupied" in driven.decisions) is is_waited_for
     assert driven.clearances.min() > 1.0
+
+
+@pytest.mark.parametrize(("away", "is_waited_for"), [(6.0, True), (12.0, False)])
+def test_a_junction_is_not_entered_when_people_come_onto_the_road_beyond_it_as_the_ego_does(
+    away: float,
+    is_waited_for: bool,  # noqa: FBT001
+) -> None:
+    line = stop_line(100.0, Control.PRIORITY, yields_to=frozenset())
+    walker = person(3, 116.0, -away, heading=UP, speed=1.2)
+    driven = drive(road(stop_lines=[line]), 1.0, speed=5.0, station=85.0, actors=[walker])
+    assert ("stop exit occupied" in driven.decisions) is is_waited_for
 
 
 def test_unlikely_future_is_ignored_and_a_likely_one_is_not() -> None:
