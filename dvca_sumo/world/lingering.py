@@ -6,7 +6,7 @@ move: so after a while it is told that the ego does not mean to go, as everybody
 
 import math
 
-_PATIENCE = 10.0  # [s]
+_PATIENCE = 20.0  # [s]: who gives way sooner fills the place that an ego in dense traffic waits for
 
 
 class Lingering:

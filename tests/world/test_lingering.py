@@ -22,22 +22,22 @@ EGO = '<trip id="ego" from="ab" to="bc" depart="0" departPos="180" departSpeed="
 FOE = '<trip id="foe" from="sb" to="ba" depart="0" departPos="150" departSpeed="5"/>'
 
 
-def test_who_stands_lets_others_go_after_ten_seconds_unless_it_sets_off_between() -> None:
+def test_who_stands_lets_others_go_after_twenty_seconds_unless_it_sets_off_between() -> None:
     lingering = Lingering()
-    moves = {0.0, 5.0, 16.0}
-    long = [time for time in np.arange(0.0, 20.0) if lingering.is_long(float(time), waits=time not in moves)]
+    moves = {0.0, 5.0, 26.0}
+    long = [time for time in np.arange(0.0, 40.0) if lingering.is_long(float(time), waits=time not in moves)]
     assert long == []
-    assert lingering.is_long(27.0, waits=True)
-    assert not lingering.is_long(28.0, waits=False)
+    assert lingering.is_long(47.0, waits=True)
+    assert not lingering.is_long(48.0, waits=False)
 
 
 def test_a_driver_who_has_to_wait_for_a_standing_ego_goes_after_a_while(
     tmp_path: Path, plain_file: Callable[..., Path]
 ) -> None:
     net = plain_file(NODES.format(kind="priority"), EDGES)
-    moments = watched(scenario_file(tmp_path, net, EGO + FOE), 300)
-    waits = [bool(moment.objects.boxes[objects_of(moment)["foe"], 1] < -5.0) for moment in moments[:250]]
-    assert all(waits[:80])
+    moments = watched(scenario_file(tmp_path, net, EGO + FOE), 400)
+    waits = [bool(moment.objects.boxes[objects_of(moment)["foe"], 1] < -5.0) for moment in moments[:350]]
+    assert all(waits[:180])
     assert not waits[-1]
 
 
@@ -51,4 +51,4 @@ def test_at_a_red_signal_an_ego_still_means_to_go(
     net = plain_file(NODES.format(kind="traffic_light"), EDGES)
     light = f'<tlLogic id="b" programID="all" type="static"><phase duration="100" state="{colour * 20}"/></tlLogic>'
     config = scenario_file(tmp_path, net, EGO.replace("180", "190"), light)
-    assert (asked(config, 150, lambda sumo: sumo.vehicle.getMaxSpeed("ego")) > 0.0) is is_held
+    assert (asked(config, 250, lambda sumo: sumo.vehicle.getMaxSpeed("ego")) > 0.0) is is_held
