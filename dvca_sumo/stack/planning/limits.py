@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from dvca_sumo.geometry.boxes import corners
-from dvca_sumo.messages import Floats, Integers, ObjectClass, VehicleShape
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Control, Crossing
 from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
@@ -149,14 +149,18 @@ def _is_green(view: LineView) -> bool:
 
 
 def _hiding(graph: Graph, line: float) -> float:
-    """The foremost nose of those who wait, or slow down, beside the ego's way at a `line` [m along the path].
+    """The foremost nose, when they have slowed down, of those who then wait beside the ego's way at a `line`.
 
-    They hide what comes, and may have seen it. Minus infinity where nobody does.
+    They hide what comes, and may have seen it. Both are arcs of the path [m]; minus infinity where nobody does.
     """
-    scene, gaps, noses = graph.scene, graph.gaps[:, 0], graph.high[:, 0]
-    waits = (gaps > 0.0) & (gaps < _BESIDE) & (np.abs(noses - line) < _AT_LINE)
+    scene, stations = graph.scene, graph.scene.futures.stations
+    speeds = np.diff(stations, prepend=np.nan) / (PREDICTION_TIMES[1] - PREDICTION_TIMES[0])
+    speeds[:, 0] = scene.speeds[scene.owners]
+    is_slow = speeds < _SLOWED
+    rows, first = np.arange(len(stations)), is_slow.argmax(axis=1)
+    gaps, noses = graph.gaps[rows, first], graph.high[rows, first]
+    waits = is_slow[rows, first] & (gaps > 0.0) & (gaps < _BESIDE) & (np.abs(noses - line) < _AT_LINE)
     waits &= (scene.futures.directions[:, 0] > ALONG) & (scene.classes[scene.owners] == _VEHICLE)
-    waits &= scene.speeds[scene.owners] < _SLOWED
     return float(noses[waits].max(initial=-math.inf))
 
 

@@ -90,7 +90,7 @@ def stop_line(station: float, control: Control, **changes: Any) -> StopLine:
 
 
 class Actor(msgspec.Struct, frozen=True):
-    """Somebody who waits at a place until `leaves` and then moves straight on at constant speed."""
+    """Somebody who waits at a place until `leaves` and then moves straight on at constant speed, or braking."""
 
     track: int
     kind: ObjectClass
@@ -102,12 +102,17 @@ class Actor(msgspec.Struct, frozen=True):
     stays_from: float = math.inf
     size: tuple[float, float] = (4.5, 1.8)
     lanes: tuple[str, ...] = ()
+    braking: float = 0.0  # [m/s^2]
 
     def speed_at(self, time: float) -> float:
-        return self.speed if self.leaves <= time < self.stays_from else 0.0
+        return (
+            max(self.speed - self.braking * (time - self.leaves), 0.0) if self.leaves <= time < self.stays_from else 0.0
+        )
 
     def box_at(self, time: float) -> list[float]:
-        way = self.speed * (min(max(time, self.leaves), max(self.stays_from, self.leaves)) - self.leaves)
+        moves_until = self.leaves + self.speed / self.braking if self.braking else self.stays_from
+        moved = min(max(time, self.leaves), max(moves_until, self.leaves)) - self.leaves
+        way = (self.speed - 0.5 * self.braking * moved) * moved
         x = self.x + way * math.cos(self.heading)
         return [x, self.y + way * math.sin(self.heading), self.heading, *self.size]
 
@@ -125,7 +130,7 @@ def car(track: int, x: float, y: float = 0.0, **changes: Any) -> Actor:
 
 
 def predicted(actors: Sequence[Actor], time: float) -> PredictedObjects:
-    """Each actor with one hypothesis: constant velocity."""
+    """Each actor with one hypothesis: constant velocity, or braking as it does."""
     count = len(actors)
     boxes = np.array([actor.box_at(time) for actor in actors]).reshape(count, 5)
     speeds = np.array([actor.speed_at(time) for actor in actors])
@@ -133,6 +138,9 @@ def predicted(actors: Sequence[Actor], time: float) -> PredictedObjects:
     velocities = np.column_stack([speeds * np.cos(headings), speeds * np.sin(headings)])
     poses = np.repeat(boxes[:, None, :3], len(PREDICTION_TIMES), axis=1)
     poses[:, :, :2] += velocities[:, None, :] * PREDICTION_TIMES[None, :, None]
+    for row, actor in enumerate(actors):
+        if actor.braking:
+            poses[row] = [actor.box_at(time + ahead)[:3] for ahead in PREDICTION_TIMES.tolist()]
     objects = TrackedObjects(
         time=time,
         ids=np.array([actor.track for actor in actors], dtype=np.int64),

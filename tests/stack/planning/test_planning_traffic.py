@@ -431,6 +431,21 @@ def test_past_who_waits_beside_at_a_line_the_ego_feels_its_way(
     assert driven.fronts[-1] > 130.0
 
 
+def test_ego_feels_its_way_past_who_will_have_stopped_beside_when_it_is_there() -> None:
+    """Who comes has priority, and that one brakes for it: slowing down only once it is slow would be too late."""
+    beside = car(3, 70.0, 3.2, speed=13.0, braking=13.0**2 / (2.0 * 27.0))
+    driven = drive(
+        road(lanes_left=1, stop_lines=[stop_line(100.0, Control.YIELD)]),
+        20.0,
+        station=58.0,
+        speed=13.0,
+        actors=[beside],
+    )
+    at_line = (driven.fronts > 98.5) & (driven.fronts < 100.5)
+    assert 1.0 < driven.speeds[at_line].min() < 2.6
+    assert driven.fronts[-1] > 130.0
+
+
 @pytest.mark.parametrize("nose", [99.0, 102.0])
 def test_ego_feels_its_way_until_the_middle_of_its_body_is_abreast_of_who_hides_what_comes(nose: float) -> None:
     beside = car(3, nose - 2.25 - 6.0, 3.2, speed=2.0, stays_from=3.0)
