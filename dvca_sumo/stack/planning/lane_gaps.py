@@ -25,6 +25,7 @@ _FALLING_BACK = 5.0  # [m/s] ... and for one that is yet to come, which the ego 
 _WITHIN = 0.3  # of its way to the next lane, the ego's body stays in its own
 _SEEN = 120.0  # [m] before and behind the ego
 _CROSSING = 2.0  # [s] at least, from the beginning of a change until the ego is on the next lane
+_SOON = 1.0  # [s] until who drifts towards a lane is taken to be on it: one may come from its other side
 _FOLLOWED = 1.0  # [s] after somebody the next one may come
 _PAST = 3.5  # times the distance to who is behind, the next lane is in view past them: by the width of cars on lanes
 _NEAR = 30.0  # [m] of effort, beyond which another place is looked for
@@ -59,7 +60,7 @@ class Gaps:
         self._config = config
 
     def occupied(self, change: LaneChange, here: float, objects: TrackedObjects) -> list[Neighbours]:
-        """For each lane of the change, who is on it or partly so; places count from the station `here` [m]."""
+        """For each lane of the change, who is on it or partly so, or soon; places count from the station `here` [m]."""
         boxes, velocities = objects.boxes, objects.velocities
         stations, offsets = self._line.project(boxes[:, :2], between=(here - _SEEN, here + _SEEN))
         headings = self._line.headings_at(stations)
@@ -68,12 +69,14 @@ class Gaps:
         cosines, sines = np.abs(directions), np.abs(np.sin(angles))
         lengths = 0.5 * (boxes[:, 3] * cosines + boxes[:, 4] * sines)
         widths = 0.5 * (boxes[:, 3] * sines + boxes[:, 4] * cosines)
-        speeds = velocities[:, 0] * np.cos(headings) + velocities[:, 1] * np.sin(headings)
+        along, across = np.cos(headings), np.sin(headings)
+        speeds = velocities[:, 0] * along + velocities[:, 1] * across
+        drifted = offsets + _SOON * (velocities[:, 1] * along - velocities[:, 0] * across)
         is_there = (objects.classes != _PERSON) & (stations < change.latest_station) & (np.abs(stations - here) < _SEEN)
         heads_along = (directions > ALONG) & (objects.classes != _STATIC)
         found = []
         for centre in change.centres(stations):
-            aside = np.abs(offsets - centre)
+            aside = np.minimum(np.abs(offsets - centre), np.abs(drifted - centre))
             rows = (is_there & (aside < widths + 0.5 * self._shape.width)).nonzero()[0]
             rows = rows[(-stations[rows]).argsort(kind="stable")]
             places, halves = stations[rows] - here, lengths[rows]

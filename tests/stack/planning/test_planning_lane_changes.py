@@ -1,5 +1,7 @@
 """Changes of lane that the route needs: into a gap, or not at all."""
 
+import math
+
 import msgspec
 import numpy as np
 import pytest
@@ -118,6 +120,30 @@ def test_one_that_pulls_into_the_gap_in_time_is_let_in() -> None:
     driven = drive(crossing_over(), 40.0, speed=13.0, station=start - 20.0, actors=[merging])
     assert driven.clearances.min() > 1.0
     assert lane_at(driven, LATEST) == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("behind", [8.0, 12.0, 16.0])
+def test_a_change_hardly_begun_is_broken_off_for_who_comes_faster_from_the_other_side_of_the_next_lane(
+    behind: float,
+) -> None:
+    """Each found the lane free when it began, and was no neighbour of it before."""
+    planner = Planner(PlanningConfig(), crossing_over(), SHAPE)
+    estimate, gaps = believed(95.0, speed=15.0), []
+    x, y, slant = 0.0, 2.0 * WIDTH, 0.0
+    for index in range(50):
+        time = 0.1 * index
+        if estimate.y < 0.4 and slant == 0.0:
+            x = estimate.x + SHAPE.centre - behind
+        else:
+            slant = 0.06 if y > WIDTH else 0.0
+        x, y = x + 2.4 * math.cos(slant), y - 2.4 * math.sin(slant)
+        other = car(7, x - 24.0 * time * math.cos(slant), y + 24.0 * time * math.sin(slant), heading=-slant, speed=24.0)
+        points = planner.step(estimate, predicted([other], time), {}).points
+        ego = box_of(estimate.x, estimate.y, estimate.heading, SHAPE)
+        gaps.append(float(distances(ego, np.array([other.box_at(time)]))[0]))
+        _, ego_x, ego_y, heading, speed, acceleration, curvature = points[1].tolist()
+        estimate = LocalizationEstimate(time + 0.1, ego_x, ego_y, heading, speed, acceleration, speed * curvature)
+    assert min(gaps) > 1.5
 
 
 @pytest.mark.parametrize("ahead", [-2.0, 0.0, 2.0])
