@@ -46,7 +46,7 @@ class LaneChanger:
 
     def __init__(self, route: Route, shape: VehicleShape, config: PlanningConfig) -> None:
         self._changes = route.lane_changes
-        self._gaps = Gaps(route.line, shape, config)
+        self._gaps = Gaps(route, shape, config)
         self._shape = shape
         self._config = config
         self._next = 0  # row of the change that is to be done

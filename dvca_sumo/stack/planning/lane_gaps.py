@@ -10,10 +10,10 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import Floats, ObjectClass, TrackedObjects, VehicleShape
-from dvca_sumo.roadmap.route import LaneChange
+from dvca_sumo.roadmap.route import LaneChange, Route
 from dvca_sumo.stack.planning.config import PlanningConfig
+from dvca_sumo.stack.planning.destination import stop_station
 from dvca_sumo.stack.planning.path import blend_length
 from dvca_sumo.stack.planning.reference import Window
 from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags
@@ -54,8 +54,9 @@ class _Slot(NamedTuple):
 class Gaps:
     """What lanes beside the line look like to an ego that may change to them."""
 
-    def __init__(self, line: Polyline, shape: VehicleShape, config: PlanningConfig) -> None:
-        self._line = line
+    def __init__(self, route: Route, shape: VehicleShape, config: PlanningConfig) -> None:
+        self._line = route.line
+        self._destination = stop_station(route, config)
         self._shape = shape
         self._config = config
 
@@ -100,7 +101,8 @@ class Gaps:
         That is where the change can begin, those on the lane keeping their speeds until then; pressed, where
         the body gets over the marking. Thus it takes up what those who stop for it offer. But who passes before that
         hides others who follow close behind. Headways need not be there before the change is over: who is faster than
-        who follows gets away until then.
+        who follows gets away until then; but who closes in does so at least until it brakes, and all the faster where
+        the ego is about to stop at its destination.
         """
         if not lane.tracks:
             return True
@@ -117,18 +119,25 @@ class Gaps:
             speed = faster
         rears, fronts = lane.rears + lane.speeds * wait, lane.fronts + lane.speeds * wait
         nose, tail = ahead + shape.front, ahead - shape.rear_overhang
-        closing = speed - lane.speeds
         is_ahead = 0.5 * (rears + fronts) > 0.5 * (nose + tail)
-        gaps = np.where(is_ahead, rears - nose, tail - fronts)
-        closing = np.where(is_ahead, closing, -closing)
-        followers = np.where(is_ahead, speed, lane.speeds)
+        gaps, speeds = np.where(is_ahead, rears - nose, tail - fronts), lane.speeds
         if is_pressed and is_ahead.all() and lane.fronts[-1] < 0.0:
-            pace = lane.speeds[-1]
-            gaps = np.append(gaps, tail - rears[-1] + _FOLLOWED * pace)
-            followers, closing = np.append(followers, pace), np.append(closing, pace - speed)
+            gaps = np.append(gaps, tail - rears[-1] + _FOLLOWED * speeds[-1])
+            is_ahead, speeds = np.append(is_ahead, False), np.append(speeds, speeds[-1])
+        closing = np.where(is_ahead, speed - speeds, speeds - self._slowed(window, speed))
         opened = _CROSSING * np.maximum(-closing, 0.0)
-        needed = config.change_gap + np.maximum(headway * followers - opened, 0.0) + _braked(closing, braking)
+        kept = np.where(
+            is_ahead,
+            headway * speed - opened,
+            np.maximum(headway * speeds - opened, config.expected_reaction * closing),
+        )
+        needed = config.change_gap + np.maximum(kept, 0.0) + _braked(closing, braking)
         return bool((gaps >= needed).all())
+
+    def _slowed(self, window: Window, speed: float) -> float:
+        """The speed that an ego at `speed` has when it is on the next lane, if only its destination has it brake."""
+        left = self._destination - window.station - self._shape.front - _CROSSING * speed
+        return min(speed, math.sqrt(2.0 * self._config.comfort_braking * max(left, 0.0)))
 
     def is_in_sight(self, own: Neighbours, lane: Neighbours, wanted: float, speed: float) -> bool:
         """Whether the ego sees far enough back on `lane`, past who is behind it on its `own`.

@@ -37,7 +37,7 @@ class Passing:
     def __init__(self, route: Route, shape: VehicleShape, config: PlanningConfig) -> None:
         self._lanes = route.passing_lanes
         self._ways_back = [_way_back(lane) for lane in route.passing_lanes]
-        self._gaps = Gaps(route.line, shape, config)
+        self._gaps = Gaps(route, shape, config)
         self._shape = shape
         self._config = config
         self._next = 0  # row of the lane to pass on that the ego is beside, or comes to

@@ -216,7 +216,7 @@ def test_from_standstill_it_does_not_begin_while_somebody_passes_who_hides_those
     window = Reference(route, SHAPE, config).window(390.0, 100.0)
     places, count = np.array(fronts), len(fronts)
     lane = Neighbours(places - 4.5, places, np.full(count, 20.0), np.ones(count, dtype=np.bool_), list(range(count)))
-    gaps = Gaps(route.line, SHAPE, config)
+    gaps = Gaps(route, SHAPE, config)
     assert gaps.is_free(lane, route.lane_changes[0], window, 0.0, is_pressed=True) is is_free
 
 
@@ -235,5 +235,29 @@ def test_close_behind_who_gets_away_it_goes_to_the_next_lane(
     window = Reference(route, SHAPE, config).window(150.0, 100.0)
     nose = np.array([SHAPE.front + 3.5])
     lane = Neighbours(nose, nose + 4.5, np.array([pace]), np.ones(1, dtype=np.bool_), [1])
-    gaps = Gaps(route.line, SHAPE, config)
+    gaps = Gaps(route, SHAPE, config)
     assert gaps.is_free(lane, route.lane_changes[0], window, 13.0, is_pressed=False) is is_free
+
+
+@pytest.mark.parametrize(
+    ("station", "front", "is_free"),
+    [
+        (150.0, -12.0, False),  # before it brakes it is at the ego's rear
+        (150.0, -19.0, True),
+        (565.0, -36.0, False),  # it has to stop as the ego does, at its destination
+        (565.0, -48.0, True),
+    ],
+)
+def test_who_closes_in_from_behind_has_room_to_see_and_to_brake_also_when_the_ego_hurries(
+    station: float,
+    front: float,
+    is_free: bool,  # noqa: FBT001
+) -> None:
+    route, config = crossing_over(), PlanningConfig()
+    window = Reference(route, SHAPE, config).window(station, 100.0)
+    speed = 9.0 if station > 500.0 else 18.0
+    fronts, speeds = np.array([front]), np.array([speed + 6.0])
+    lane = Neighbours(fronts - 4.5, fronts, speeds, np.ones(1, dtype=np.bool_), [1])
+    gaps = Gaps(route, SHAPE, config)
+    change = msgspec.structs.replace(route.lane_changes[0], latest_station=590.0)
+    assert gaps.is_free(lane, change, window, speed, is_pressed=False, is_hurried=True) is is_free
