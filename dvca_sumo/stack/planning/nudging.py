@@ -16,6 +16,7 @@ from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags, Scene
 
 _VEHICLE, _PERSON, _STATIC = (int(kind) for kind in (ObjectClass.VEHICLE, ObjectClass.PEDESTRIAN, ObjectClass.STATIC))
 _COMMITTED = 0.5  # of the offset: from there on it is safer to go on than to go back
+_UNSURE = 0.08  # [m] less room than wanted at least does not end a nudge: noise, and still more than what is in the way
 _DRIVING = 1.0  # [s] of moving: what is seen first may seem to move for less
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane
 _CLOSING = 2.0  # [s] of closing speed kept to those who come from behind
@@ -117,8 +118,10 @@ class NudgeDecider:
         While there is no room beside for the wanted clearance, the room that the lane leaves will do if it is enough,
         or else the least clearance.
         """
-        hold = self._config.nudge_hold
-        room = room_beside(blocker, situation.window, situation.speed, self._shape, self._config)
+        hold, least = self._config.nudge_hold, self._config.nudge_clearance_least
+        if blocker.track in self._held:
+            least -= _UNSURE
+        room = room_beside(blocker, situation.window, situation.speed, least, self._shape, self._config)
         held = self._held_offset(blocker.track)
         begun = 0.0 if room.is_in_lane(held, hold) else held
         turns_in = self._turns_in(blocker, situation)

@@ -26,8 +26,13 @@ class Room(NamedTuple):
         return self.lane_right - tolerance <= offset <= self.lane_left + tolerance
 
 
-def room_beside(blocker: Blocker, window: Window, speed: float, shape: VehicleShape, config: PlanningConfig) -> Room:
-    """The room to pass `blocker` at `speed` [m/s]; the road's edges are looked at on the way out and back, too."""
+def room_beside(
+    blocker: Blocker, window: Window, speed: float, least: float, shape: VehicleShape, config: PlanningConfig
+) -> Room:
+    """The room to pass `blocker` at `speed` [m/s] and no nearer than `least` [m].
+
+    The road's edges are looked at on the way out and back, too.
+    """
     begin, end = blocker.low - shape.front, blocker.high + shape.rear_overhang
     blend = blend_length(blocker.wanted, speed, config)
     whole = window.span(max(begin - 0.5 * blend, 0.0), end + 0.5 * blend)
@@ -37,7 +42,7 @@ def room_beside(blocker: Blocker, window: Window, speed: float, shape: VehicleSh
     return Room(
         float((window.lane_left - window.swept_left)[beside].min()) + _OVER_LINE,
         float((window.lane_right - window.swept_right)[beside].max()) - _OVER_LINE,
-        _wanted(blocker, window, whole, shape, config),
+        _wanted(blocker, window, whole, least, shape, config),
     )
 
 
@@ -46,8 +51,10 @@ def tightened(blocker: Blocker, offset: float, config: PlanningConfig) -> float:
     return math.copysign(max(abs(offset) - blocker.clearance(offset) + config.nudge_clearance_least, 0.0), offset)
 
 
-def _wanted(blocker: Blocker, window: Window, span: slice, shape: VehicleShape, config: PlanningConfig) -> list[float]:
-    edge, least = config.edge_clearance, config.nudge_clearance_least
+def _wanted(
+    blocker: Blocker, window: Window, span: slice, least: float, shape: VehicleShape, config: PlanningConfig
+) -> list[float]:
+    edge = config.edge_clearance
     inward_left, inward_right = _steerable(window.curvatures[span], shape, config)
     leftmost = max(min(float((window.road_left - window.swept_left)[span].min()) - edge, inward_left), 0.0)
     rightmost = min(max(float((window.road_right - window.swept_right)[span].max()) + edge, inward_right), 0.0)

@@ -1,6 +1,7 @@
 """Around what stands in the way."""
 
 import math
+from itertools import pairwise
 
 import msgspec
 import numpy as np
@@ -375,3 +376,22 @@ def test_who_stands_aslant_at_a_junction_comes_into_the_lane_and_is_not_passed_w
     driven = drive(road(stop_lines=[junction]), 40.0, speed=10.0, actors=[standing])
     assert decision in driven.decisions
     assert (driven.fronts[-1] > 120.0) == (decision == "nudge left 5")
+
+
+class Wavering(Actor, frozen=True):
+    """As a tracker has who stands: a little to the left, then to the right."""
+
+    def box_at(self, time: float) -> list[float]:
+        x, y, *rest = super().box_at(time)
+        return [x, y + (0.02 if round(10.0 * time) % 4 < 2 else -0.02), *rest]
+
+
+@pytest.mark.parametrize("y", [-1.81, -1.79])
+def test_a_nudge_with_hardly_room_is_carried_through_once_it_is_begun(y: float) -> None:
+    """Else the ego stops and starts with every measurement, a little closer each time."""
+    van = Wavering(7, ObjectClass.VEHICLE, 100.0, y, size=(5.0, 2.0))
+    driven = drive(road(), 30.0, station=40.0, speed=10.0, actors=[van])
+    assert driven.fronts[-1] > 150.0
+    assert driven.clearances.min() > 0.35
+    changes = sum(one != next_one for one, next_one in pairwise(driven.decisions))
+    assert changes < 6
