@@ -115,7 +115,8 @@ class PredictedObjects(msgspec.Struct, frozen=True):
         return self.objects.time
 
 
-PREDICTION_TIMES: Floats = np.arange(25, dtype=np.float64) * 0.25  # [s] 0 ... 6 s after the message
+PREDICTION_STEP = 0.25  # [s]
+PREDICTION_TIMES: Floats = np.arange(25, dtype=np.float64) * PREDICTION_STEP  # [s] 0 ... 6 s after the message
 TRAJECTORY_TIMES: Floats = np.arange(81, dtype=np.float64) * 0.1  # [s] 0 ... 8 s after the message
 
 # Columns of Trajectory.points.

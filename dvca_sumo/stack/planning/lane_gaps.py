@@ -70,9 +70,9 @@ class Gaps:
         cosines, sines = np.abs(directions), np.abs(np.sin(angles))
         lengths = 0.5 * (boxes[:, 3] * cosines + boxes[:, 4] * sines)
         widths = 0.5 * (boxes[:, 3] * sines + boxes[:, 4] * cosines)
-        along, across = np.cos(headings), np.sin(headings)
-        speeds = velocities[:, 0] * along + velocities[:, 1] * across
-        drifted = offsets + _SOON * (velocities[:, 1] * along - velocities[:, 0] * across)
+        east, north = np.cos(headings), np.sin(headings)
+        speeds = velocities[:, 0] * east + velocities[:, 1] * north
+        drifted = offsets + _SOON * (velocities[:, 1] * east - velocities[:, 0] * north)
         is_there = (objects.classes != _PERSON) & (stations < change.latest_station) & (np.abs(stations - here) < _SEEN)
         heads_along = (directions > ALONG) & (objects.classes != _STATIC)
         found = []

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from dvca_sumo.geometry.boxes import corners
-from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, VehicleShape
+from dvca_sumo.messages import PREDICTION_STEP, Floats, Integers, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Control, Crossing
 from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
@@ -154,7 +154,7 @@ def _hiding(graph: Graph, line: float) -> float:
     They hide what comes, and may have seen it. Both are arcs of the path [m]; minus infinity where nobody does.
     """
     scene, stations = graph.scene, graph.scene.futures.stations
-    speeds = np.diff(stations, prepend=np.nan) / (PREDICTION_TIMES[1] - PREDICTION_TIMES[0])
+    speeds = np.diff(stations, prepend=np.nan) / PREDICTION_STEP
     speeds[:, 0] = scene.speeds[scene.owners]
     is_slow = speeds < _SLOWED
     rows, first = np.arange(len(stations)), is_slow.argmax(axis=1)

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.boxes import outlines
-from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, VehicleShape
+from dvca_sumo.messages import PREDICTION_STEP, Floats, Integers, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Crossing, Overpass, Route
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Path
@@ -167,7 +167,7 @@ def _margins(
         return margins
     offsets, stations = scene.futures.offsets, scene.futures.stations[:, 0] + window.station
     walked = np.abs(offsets[:, 1] - offsets[:, 0])
-    across = people & (walked > _WALKS_ACROSS * (PREDICTION_TIMES[1] - PREDICTION_TIMES[0]))
+    across = people & (walked > _WALKS_ACROSS * PREDICTION_STEP)
     across &= gaps.min(axis=1) < config.person_margin
     margins[people] = config.person_margin
     if speed < config.creeping_speed:
@@ -226,7 +226,7 @@ def leader_of(rows: list[int], graph: Graph, shape: VehicleShape) -> Leader | No
     ends = np.minimum(columns + 1, count - 1)
     rears, speeds, times = np.empty(count + 1), np.empty(count + 1), np.empty(count + 1)
     rears[:-1] = places[nearest, columns]
-    speeds[:-1] = (low[nearest, ends] - low[nearest, ends - 1]) / (PREDICTION_TIMES[1] - PREDICTION_TIMES[0])
+    speeds[:-1] = (low[nearest, ends] - low[nearest, ends - 1]) / PREDICTION_STEP
     times[:-1], times[-1] = scene.times, STEP_TIMES[-1]
     speeds[-1] = speeds[-2]
     rears[-1] = rears[-2] + (times[-1] - times[-2]) * speeds[-1]
