@@ -24,6 +24,7 @@ _SLOWEST = 2.0  # [m/s] beside a gap ...
 _FALLING_BACK = 5.0  # [m/s] ... and for one that is yet to come, which the ego does not wait for before it has to
 _WITHIN = 0.3  # of its way to the next lane, the ego's body stays in its own
 _SEEN = 120.0  # [m] before and behind the ego
+_BEYOND = 1.0  # [m] of line, to which everybody belongs who is farther away
 _CROSSING = 2.0  # [s] at least, from the beginning of a change until the ego is on the next lane
 _SOON = 1.0  # [s] until who drifts towards a lane is taken to be on it: one may come from its other side
 _FOLLOWED = 1.0  # [s] after somebody the next one may come
@@ -63,7 +64,8 @@ class Gaps:
     def occupied(self, change: LaneChange, here: float, objects: TrackedObjects) -> list[Neighbours]:
         """For each lane of the change, who is on it or partly so, or soon; places count from the station `here` [m]."""
         boxes, velocities = objects.boxes, objects.velocities
-        stations, offsets = self._line.project(boxes[:, :2], between=(here - _SEEN, here + _SEEN))
+        reach = _SEEN + _BEYOND
+        stations, offsets = self._line.project(boxes[:, :2], between=(here - reach, here + reach))
         headings = self._line.headings_at(stations)
         angles = boxes[:, 2] - headings
         directions = np.cos(angles)

@@ -261,3 +261,15 @@ def test_who_closes_in_from_behind_has_room_to_see_and_to_brake_also_when_the_eg
     gaps = Gaps(route, SHAPE, config)
     change = msgspec.structs.replace(route.lane_changes[0], latest_station=590.0)
     assert gaps.is_free(lane, change, window, speed, is_pressed=False, is_hurried=True) is is_free
+
+
+@pytest.mark.parametrize("ahead", [-124.0, -121.0, -118.0, 118.0, 121.0, 124.0])
+def test_who_is_far_away_is_on_no_lane_beside_their_own(ahead: float) -> None:
+    route, config = crossing_over(lanes=2), PlanningConfig()
+    change = msgspec.structs.replace(route.lane_changes[0], latest_station=590.0)
+    gaps = Gaps(route, SHAPE, config)
+    for here in np.arange(150.0, 160.0, 0.1).tolist():
+        x, y, _ = route.line.poses([here + ahead])[0]
+        lanes = gaps.occupied(change, here, predicted([car(7, x, y)], 0.0).objects)
+        found = [lane for lane, occupied in enumerate(lanes) if occupied.tracks]
+        assert found == ([] if abs(ahead) > 120.0 else [0 if ahead < 0.0 else 2])
