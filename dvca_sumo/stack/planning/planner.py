@@ -193,15 +193,29 @@ def _described(nudges: list[Nudge], path: Path) -> str:
 
 
 def _points(path: Path, profile: Profile) -> Floats:
+    """The path at the places that the profile has reached at each time of a trajectory.
+
+    Between rows of the path, headings are the cubic with the rows' curvatures as slopes, and curvatures are its slope:
+    a plan that begins anew from any of its points, again and again, turns neither sooner nor later than it tells.
+    """
     arcs, speeds, accelerations = profile.rows()
     points = np.empty((len(TRAJECTORY_TIMES), 7))
     points[:, 0] = TRAJECTORY_TIMES
-    for column, values in ((1, path.x), (2, path.y), (3, path.headings), (6, path.curvatures)):
-        points[:, column] = np.interp(arcs, path.arcs, values)
+    points[:, 1] = np.interp(arcs, path.arcs, path.x)
+    points[:, 2] = np.interp(arcs, path.arcs, path.y)
     points[:, 4] = speeds
     points[:, 5] = accelerations
-    parts = np.interp(arcs, path.arcs, np.arange(len(path.arcs), dtype=np.float64)) % 1.0
-    bulge = 0.5 * points[:, 6] * parts * (1.0 - parts)  # of an arc over its chord; rows of the path are 1 m apart
+    rows = path.arcs[1:-1].searchsorted(arcs, side="right")
+    steps = path.arcs[rows + 1] - path.arcs[rows]
+    parts = (arcs - path.arcs[rows]) / steps
+    first = path.curvatures[rows] * steps
+    last = path.curvatures[rows + 1] * steps
+    turned = path.headings[rows + 1] - path.headings[rows]
+    third = first + last - 2.0 * turned
+    second = turned - first - third
+    points[:, 3] = path.headings[rows] + parts * (first + parts * (second + parts * third))
+    points[:, 6] = (first + parts * (2.0 * second + 3.0 * parts * third)) / steps
+    bulge = 0.5 * points[:, 6] * parts * (1.0 - parts) * steps * steps  # of an arc over its chord
     points[:, 1] += bulge * np.sin(points[:, 3])
     points[:, 2] -= bulge * np.cos(points[:, 3])
     return points

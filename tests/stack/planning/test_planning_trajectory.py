@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from planned_drives import SHAPE, believed, car, curve_points, predicted, road
+from planned_drives import SHAPE, believed, car, curve_points, drive, predicted, road
 
 from dvca_sumo.messages import TRAJECTORY_TIMES, Trajectory
 from dvca_sumo.stack.planning import Planner, PlanningConfig
@@ -108,6 +108,15 @@ def test_path_is_as_curved_as_it_turns_however_short_a_move_aside() -> None:
     path = path_along(window, start, Lateral(0.0, 0.02, 0.0), [Plateau(1.4, 8.0, 0.06)], SHAPE, PlanningConfig())
     turned = (path.headings[2:] - path.headings[:-2]) / (path.arcs[2:] - path.arcs[:-2])
     assert np.abs(path.curvatures[1:-1] - turned).max() < 0.005
+
+
+def test_planned_again_and_again_it_turns_as_much_as_its_curvatures_say() -> None:
+    states = drive(road(curve_points(6.5, 40.0)), 14.0, station=25.0, speed=4.0).states
+    ways = np.hypot(np.diff(states[:, 1]), np.diff(states[:, 2]))
+    told = np.cumsum(0.5 * (states[1:, 6] + states[:-1, 6]) * ways)
+    turned = states[1:, 3] - states[0, 3]
+    assert turned[-1] > 1.5
+    assert np.abs(turned - told).max() < math.radians(0.3)
 
 
 def test_window_projects_like_the_line_itself() -> None:
