@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.messages import Floats, TrackedObjects, VehicleShape
-from dvca_sumo.roadmap.route import LaneChange, Route
+from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.lane_gaps import LAST_SPEED, Gaps, Neighbours
 from dvca_sumo.stack.planning.path import blend_length
@@ -44,9 +44,9 @@ class LaneChoice(msgspec.Struct, frozen=True, eq=False):
 class LaneChanger:
     """Decides at each change of the route which of its lanes to be on."""
 
-    def __init__(self, route: Route, shape: VehicleShape, config: PlanningConfig) -> None:
-        self._changes = route.lane_changes
-        self._gaps = Gaps(route, shape, config)
+    def __init__(self, changes: Sequence[LaneChange], gaps: Gaps, shape: VehicleShape, config: PlanningConfig) -> None:
+        self._changes = changes
+        self._gaps = gaps
         self._shape = shape
         self._config = config
         self._next = 0  # row of the change that is to be done

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import Floats, ObjectClass, TrackedObjects, VehicleShape
-from dvca_sumo.roadmap.route import LaneChange, Route
+from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.destination import stop_station
 from dvca_sumo.stack.planning.path import blend_length
 from dvca_sumo.stack.planning.reference import Window
 from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags
@@ -53,11 +53,12 @@ class _Slot(NamedTuple):
 
 
 class Gaps:
-    """What lanes beside the line look like to an ego that may change to them."""
+    """What lanes beside the route's line look like to an ego that may change to them."""
 
-    def __init__(self, route: Route, shape: VehicleShape, config: PlanningConfig) -> None:
-        self._line = route.line
-        self._destination = stop_station(route, config)
+    def __init__(self, line: Polyline, destination: float, shape: VehicleShape, config: PlanningConfig) -> None:
+        """The ego stops at the station `destination` [m]."""
+        self._line = line
+        self._destination = destination
         self._shape = shape
         self._config = config
 

@@ -5,11 +5,12 @@ room for it.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from dvca_sumo.messages import PREDICTION_TIMES, PredictedObjects, VehicleShape
-from dvca_sumo.roadmap.route import LaneChange, PassingLane, Route
+from dvca_sumo.roadmap.route import LaneChange, PassingLane
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.lane_changing import (
     ARRIVED,
@@ -34,10 +35,10 @@ _BETWEEN = float(PREDICTION_TIMES[_LAST] - PREDICTION_TIMES[_FIRST])  # [s]
 class Passing:
     """Decides at each lane to pass on whether to be on it."""
 
-    def __init__(self, route: Route, shape: VehicleShape, config: PlanningConfig) -> None:
-        self._lanes = route.passing_lanes
-        self._ways_back = [_way_back(lane) for lane in route.passing_lanes]
-        self._gaps = Gaps(route, shape, config)
+    def __init__(self, lanes: Sequence[PassingLane], gaps: Gaps, shape: VehicleShape, config: PlanningConfig) -> None:
+        self._lanes = lanes
+        self._ways_back = [_way_back(lane) for lane in lanes]
+        self._gaps = gaps
         self._shape = shape
         self._config = config
         self._next = 0  # row of the lane to pass on that the ego is beside, or comes to

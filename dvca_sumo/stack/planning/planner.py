@@ -18,6 +18,7 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.destination import stop_station
 from dvca_sumo.stack.planning.junctions import Junctions, LineView
 from dvca_sumo.stack.planning.lane_changing import LaneChanger, LaneChoice
+from dvca_sumo.stack.planning.lane_gaps import Gaps
 from dvca_sumo.stack.planning.limits import nearest_stop, speed_caps
 from dvca_sumo.stack.planning.meeting import Demand, Meetings
 from dvca_sumo.stack.planning.nudging import Nudge, NudgeDecider, Situation
@@ -50,8 +51,9 @@ class Planner:
         self._reference = Reference(route, shape, config)
         self._destination = stop_station(route, config)
         self._junctions = Junctions(route, shape, config)
-        self._lane_changer = LaneChanger(route, shape, config)
-        self._passing = Passing(route, shape, config)
+        gaps = Gaps(route.line, self._destination, shape, config)
+        self._lane_changer = LaneChanger(route.lane_changes, gaps, shape, config)
+        self._passing = Passing(route.passing_lanes, gaps, shape, config)
         self._nudging = NudgeDecider(shape, config)
         self._settling = Settling(config)
         self._standing = Standing()

@@ -12,6 +12,7 @@ from dvca_sumo.messages import Floats, LocalizationEstimate
 from dvca_sumo.roadmap import Control, Route
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning import Planner, PlanningConfig
+from dvca_sumo.stack.planning.destination import stop_station
 from dvca_sumo.stack.planning.lane_gaps import Gaps, Neighbours
 from dvca_sumo.stack.planning.reference import Reference
 
@@ -43,6 +44,10 @@ def crossing_over(lanes: int = 1) -> Route:
         "road_right": -0.5 * WIDTH - over,
     }
     return msgspec.structs.replace(found, lane_changes=(change,), **edges)
+
+
+def beside(route: Route, config: PlanningConfig) -> Gaps:
+    return Gaps(route.line, stop_station(route, config), SHAPE, config)
 
 
 def lane_at(driven: Drive, x: float) -> float:
@@ -216,7 +221,7 @@ def test_from_standstill_it_does_not_begin_while_somebody_passes_who_hides_those
     window = Reference(route, SHAPE, config).window(390.0, 100.0)
     places, count = np.array(fronts), len(fronts)
     lane = Neighbours(places - 4.5, places, np.full(count, 20.0), np.ones(count, dtype=np.bool_), list(range(count)))
-    gaps = Gaps(route, SHAPE, config)
+    gaps = beside(route, config)
     assert gaps.is_free(lane, route.lane_changes[0], window, 0.0, is_pressed=True) is is_free
 
 
@@ -235,7 +240,7 @@ def test_close_behind_who_gets_away_it_goes_to_the_next_lane(
     window = Reference(route, SHAPE, config).window(150.0, 100.0)
     nose = np.array([SHAPE.front + 3.5])
     lane = Neighbours(nose, nose + 4.5, np.array([pace]), np.ones(1, dtype=np.bool_), [1])
-    gaps = Gaps(route, SHAPE, config)
+    gaps = beside(route, config)
     assert gaps.is_free(lane, route.lane_changes[0], window, 13.0, is_pressed=False) is is_free
 
 
@@ -258,7 +263,7 @@ def test_who_closes_in_from_behind_has_room_to_see_and_to_brake_also_when_the_eg
     speed = 9.0 if station > 500.0 else 18.0
     fronts, speeds = np.array([front]), np.array([speed + 6.0])
     lane = Neighbours(fronts - 4.5, fronts, speeds, np.ones(1, dtype=np.bool_), [1])
-    gaps = Gaps(route, SHAPE, config)
+    gaps = beside(route, config)
     change = msgspec.structs.replace(route.lane_changes[0], latest_station=590.0)
     assert gaps.is_free(lane, change, window, speed, is_pressed=False, is_hurried=True) is is_free
 
@@ -267,7 +272,7 @@ def test_who_closes_in_from_behind_has_room_to_see_and_to_brake_also_when_the_eg
 def test_who_is_far_away_is_on_no_lane_beside_their_own(ahead: float) -> None:
     route, config = crossing_over(lanes=2), PlanningConfig()
     change = msgspec.structs.replace(route.lane_changes[0], latest_station=590.0)
-    gaps = Gaps(route, SHAPE, config)
+    gaps = beside(route, config)
     for here in np.arange(150.0, 160.0, 0.1).tolist():
         x, y, _ = route.line.poses([here + ahead])[0]
         lanes = gaps.occupied(change, here, predicted([car(7, x, y)], 0.0).objects)

@@ -9,6 +9,7 @@ from dvca_sumo.messages import PREDICTION_TIMES
 from dvca_sumo.roadmap import Route
 from dvca_sumo.roadmap.route import PassingLane
 from dvca_sumo.stack.planning import PlanningConfig
+from dvca_sumo.stack.planning.lane_gaps import Gaps
 from dvca_sumo.stack.planning.passing import Passing
 from dvca_sumo.stack.planning.reference import Reference
 
@@ -88,7 +89,8 @@ def test_who_is_going_to_be_slow_is_passed_while_there_is_a_gap(braking: float) 
     ahead.poses[0, :, 0] -= braking * slowing * (PREDICTION_TIMES - 0.5 * slowing)
     route, config = beside(), PlanningConfig()
     window = Reference(route, SHAPE, config).window(40.0, 150.0)
-    choice = Passing(route, SHAPE, config).step(window, 0.0, 13.0, ahead)
+    gaps = Gaps(route.line, route.line.length, SHAPE, config)
+    choice = Passing(route.passing_lanes, gaps, SHAPE, config).step(window, 0.0, 13.0, ahead)
     assert (choice is not None and choice.keeping is not None) == (braking > 0.0)
 
 
