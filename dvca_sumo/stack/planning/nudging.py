@@ -18,6 +18,7 @@ _VEHICLE, _PERSON, _STATIC = (int(kind) for kind in (ObjectClass.VEHICLE, Object
 _COMMITTED = 0.5  # of the offset: from there on it is safer to go on than to go back
 _UNSURE = 0.08  # [m] less room than wanted at least does not end a nudge: noise, and still more than what is in the way
 _DRIVING = 1.0  # [s] of moving: what is seen first may seem to move for less
+_GENTLE = 10.0  # [m] of a move aside: on less, the front swings out far beyond where it ends
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane
 _CLOSING = 2.0  # [s] of closing speed kept to those who come from behind
 
@@ -87,7 +88,7 @@ class NudgeDecider:
         """Where and how far to move aside; None where there is no way round, or where none is needed.
 
         Where nothing can be reached before the object is passed it is what is reached soonest, if that is needed at
-        all; not for who walks.
+        all; not for who walks. Beside it, the ego does not turn back towards it, however little room it has.
         """
         late = []
         for offset in self._choices(blocker, situation):
@@ -99,16 +100,26 @@ class NudgeDecider:
             if plateau.begin <= blocker.high or offset == self._held_offset(blocker.track):
                 return plateau
             late.append(plateau)
-        return None if blocker.walks or self._clears(blocker, 0.0) else min(late, default=None)
+        if self._clears(blocker, 0.0):
+            return None
+        if blocker.track in self._held and blocker.low < self._shape.front:
+            return self._reached(blocker, self._held_offset(blocker.track), situation)
+        return None if blocker.walks else min(late, default=None)
 
     def _reached(self, blocker: Blocker, offset: float, situation: Situation) -> Plateau:
-        """Where the offset has to be reached and left. A move once begun later than that ends where it did before."""
-        begin = blocker.low - self._shape.front - LENGTHWISE
+        """Where the offset has to be reached and left. A move once begun later than that ends where it did before.
+
+        Where there is little room, the front may be beside the object in the second half of the move: turned outwards,
+        it is at least as far aside as the rear axle is going to be.
+        """
+        room = blocker.low - self._shape.front
+        begin = room - LENGTHWISE
         end = blocker.high + self._shape.rear_overhang + LENGTHWISE
         end += blocker.speed * end / max(situation.speed - blocker.speed, SLOWEST)
         if offset == self._held_offset(blocker.track):
             begin = max(begin, self._held[blocker.track].begin - situation.window.station)
         else:
+            begin = max(begin, min(room + min(room, self._shape.front), _GENTLE))
             begin = max(begin, feasible_length(situation.lateral, offset, begin, situation.speed, self._config))
         return Plateau(begin, max(end, begin), offset)
 

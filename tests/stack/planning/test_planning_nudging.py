@@ -70,6 +70,17 @@ def test_ego_that_has_stopped_behind_a_car_can_still_pull_out() -> None:
     assert_drivable(driven)
 
 
+def test_ego_that_pulls_out_keeps_its_front_on_the_road() -> None:
+    van = car(5, 16.2, -1.85, size=(5.0, 2.0))
+    driven = drive(road(), 20.0, actors=[van])
+    assert driven.clearances.min() > 0.4
+    assert driven.fronts[-1] > 80.0
+    headings = driven.states[:, 3]
+    corners = driven.states[:, 2] + SHAPE.front * np.sin(headings) + 0.5 * SHAPE.width * np.cos(headings)
+    assert corners.max() < 1.6
+    assert_drivable(driven)
+
+
 @pytest.mark.parametrize(("gap", "x", "most"), [(0.2, 9.8, 0.25), (0.5, 9.0, 0.0)])
 def test_who_stands_before_the_nose_is_passed_at_what_can_be_reached_by_then(gap: float, x: float, most: float) -> None:
     """Not at all the clearance wanted, which would be reached only when they are behind the ego."""
@@ -395,3 +406,21 @@ def test_a_nudge_with_hardly_room_is_carried_through_once_it_is_begun(y: float) 
     assert driven.clearances.min() > 0.35
     changes = sum(one != next_one for one, next_one in pairwise(driven.decisions))
     assert changes < 6
+
+
+class Widening(Actor, frozen=True):
+    """As a tracker has who is a little wider when seen from beside than from behind."""
+
+    def box_at(self, time: float) -> list[float]:
+        x, y, heading, length, width = super().box_at(time)
+        return [x, y, heading, length, width + (0.3 if time >= self.leaves else 0.0)]
+
+
+def test_beside_who_leaves_less_room_than_it_seemed_the_ego_does_not_turn_back_towards_them() -> None:
+    van = Widening(7, ObjectClass.VEHICLE, 100.0, -1.85, size=(5.0, 2.0), leaves=4.9)
+    driven = drive(road(), 30.0, station=40.0, speed=10.0, actors=[van])
+    beside = (driven.fronts > 97.5) & (driven.fronts - SHAPE.length < 102.5)
+    assert not beside[:48].any()
+    assert beside[49]
+    assert driven.states[beside, 2].min() > 0.45
+    assert driven.clearances.min() > 0.2
