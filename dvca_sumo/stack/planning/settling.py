@@ -1,5 +1,7 @@
 """Moves onto the line of another lane end where they were to end when they began."""
 
+import math
+
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length
 
@@ -17,7 +19,10 @@ class Settling:
     def step(self, lateral: Lateral, station: float, speed: float) -> list[Plateau]:
         """Where the ego, `lateral` to the line of this cycle at the route's `station` [m], has to be on it; or none."""
         if abs(lateral.offset - self._offset) > _LEAP:
-            self._end = station + blend_length(lateral.unsettled, speed, self._config)
+            length = blend_length(lateral.unsettled, speed, self._config)
+            if lateral.slope * lateral.offset > 0.0:  # still going away from it, and the farther the longer the move
+                length *= math.sqrt(self._config.shift_acceleration / self._config.hard_shift_acceleration)
+            self._end = station + length
         self._offset = lateral.offset
         if self._end is None or self._end <= station:
             self._end = None
