@@ -5,6 +5,7 @@ import math
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length
 
+_AWAY = 0.5  # [m] farther from the line it still goes, for the move to be a hard one: the longer, the farther
 _LEAP = 0.5  # [m] from one cycle to the next: the line is that of another lane
 
 
@@ -20,7 +21,8 @@ class Settling:
         """Where the ego, `lateral` to the line of this cycle at the route's `station` [m], has to be on it; or none."""
         if abs(lateral.offset - self._offset) > _LEAP:
             length = blend_length(lateral.unsettled, speed, self._config)
-            if lateral.slope * lateral.offset > 0.0:  # still going away from it, and the farther the longer the move
+            away = 0.5 * (lateral.slope * speed) ** 2 / self._config.shift_acceleration  # [m] until it is turned round
+            if lateral.slope * lateral.offset > 0.0 and away > _AWAY:
                 length *= math.sqrt(self._config.shift_acceleration / self._config.hard_shift_acceleration)
             self._end = station + length
         self._offset = lateral.offset
