@@ -203,19 +203,20 @@ def _points(path: Path, profile: Profile) -> Floats:
     arcs, speeds, accelerations = profile.rows()
     points = np.empty((len(TRAJECTORY_TIMES), 7))
     points[:, 0] = TRAJECTORY_TIMES
-    points[:, 1] = np.interp(arcs, path.arcs, path.x)
-    points[:, 2] = np.interp(arcs, path.arcs, path.y)
     points[:, 4] = speeds
     points[:, 5] = accelerations
+    table = np.array((path.arcs, path.x, path.y, path.headings, path.curvatures))
     rows = path.arcs[1:-1].searchsorted(arcs, side="right")
-    steps = path.arcs[rows + 1] - path.arcs[rows]
-    parts = (arcs - path.arcs[rows]) / steps
-    first = path.curvatures[rows] * steps
-    last = path.curvatures[rows + 1] * steps
-    turned = path.headings[rows + 1] - path.headings[rows]
+    before, after = table.take(rows, axis=1), table.take(rows + 1, axis=1)
+    steps, east, north, turned, _ = after - before
+    ahead = arcs - before[0]
+    parts = ahead / steps
+    points[:, 1] = east / steps * ahead + before[1]
+    points[:, 2] = north / steps * ahead + before[2]
+    first, last = before[4] * steps, after[4] * steps
     third = first + last - 2.0 * turned
     second = turned - first - third
-    points[:, 3] = path.headings[rows] + parts * (first + parts * (second + parts * third))
+    points[:, 3] = before[3] + parts * (first + parts * (second + parts * third))
     points[:, 6] = (first + parts * (2.0 * second + 3.0 * parts * third)) / steps
     bulge = 0.5 * points[:, 6] * parts * (1.0 - parts) * steps * steps  # of an arc over its chord
     points[:, 1] += bulge * np.sin(points[:, 3])
