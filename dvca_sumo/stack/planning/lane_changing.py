@@ -80,7 +80,9 @@ class LaneChanger:
         is_hurried = stop.at < self._config.change_hurry * speed
         occupied = self._gaps.occupied(change, window.station, objects)
         target = self._lane
-        waits = is_at_junction(change, window, speed, self._shape, self._config)
+        # A change begun in the other direction swings out far before it turns round.
+        is_going_back = self._target == self._lane and abs(aside) > ARRIVED and speed > LAST_SPEED
+        waits = is_going_back or is_at_junction(change, window, speed, self._shape, self._config)
         while target < last and (target < self._target or not waits):
             is_pressed = has_to or target < self._target
             lane = occupied[target + 1]

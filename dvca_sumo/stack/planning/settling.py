@@ -1,11 +1,8 @@
 """Moves onto the line of another lane end where they were to end when they began."""
 
-import math
-
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length
 
-_AWAY = 0.5  # [m] farther from the line it still goes, for the move to be a hard one: the longer, the farther
 _LEAP = 0.5  # [m] from one cycle to the next: the line is that of another lane
 
 
@@ -20,11 +17,7 @@ class Settling:
     def step(self, lateral: Lateral, station: float, speed: float) -> list[Plateau]:
         """Where the ego, `lateral` to the line of this cycle at the route's `station` [m], has to be on it; or none."""
         if abs(lateral.offset - self._offset) > _LEAP:
-            length = blend_length(lateral.unsettled, speed, self._config)
-            away = 0.5 * (lateral.slope * speed) ** 2 / self._config.shift_acceleration  # [m] until it is turned round
-            if lateral.slope * lateral.offset > 0.0 and away > _AWAY:
-                length *= math.sqrt(self._config.shift_acceleration / self._config.hard_shift_acceleration)
-            self._end = station + length
+            self._end = station + blend_length(lateral.unsettled, speed, self._config)
         self._offset = lateral.offset
         if self._end is None or self._end <= station:
             self._end = None
