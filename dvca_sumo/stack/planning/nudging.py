@@ -1,5 +1,6 @@
 """The path decision: around what stands in the way, on which side and by how much, or not at all."""
 
+import math
 from collections.abc import Container, Iterator
 
 import msgspec
@@ -11,14 +12,13 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length, feasible_length
 from dvca_sumo.stack.planning.reference import Window
-from dvca_sumo.stack.planning.room import room_beside, tightened
+from dvca_sumo.stack.planning.room import room_beside, roomy_length
 from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags, Scene
 
 _VEHICLE, _PERSON, _STATIC = (int(kind) for kind in (ObjectClass.VEHICLE, ObjectClass.PEDESTRIAN, ObjectClass.STATIC))
 _COMMITTED = 0.5  # of the offset: from there on it is safer to go on than to go back
 _UNSURE = 0.08  # [m] less room than wanted at least does not end a nudge: noise, and still more than what is in the way
 _DRIVING = 1.0  # [s] of moving: what is seen first may seem to move for less
-_GENTLE = 10.0  # [m] of a move aside: on less, the front swings out far beyond where it ends
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane
 _CLOSING = 2.0  # [s] of closing speed kept to those who come from behind
 
@@ -87,40 +87,45 @@ class NudgeDecider:
     def _plateau(self, blocker: Blocker, situation: Situation) -> Plateau | None:
         """Where and how far to move aside; None where there is no way round, or where none is needed.
 
-        Where nothing can be reached before the object is passed it is what is reached soonest, if that is needed at
-        all; not for who walks. Beside it, the ego does not turn back towards it, however little room it has.
+        Where it cannot be reached before the object is passed, the front staying on the road, it is the smallest move
+        possible, if one is needed at all; not for who walks. Beside it, the ego does not turn back towards it, however
+        little room it has.
         """
         late = []
+        latest = blocker.high
+        if not self._clears(blocker, 0.0):
+            # In the second half of the move, the front, turned outwards, is as far aside as the ego is going to be.
+            room = blocker.low - self._shape.front
+            latest = min(room + min(room, self._shape.front), latest)
         for offset in self._choices(blocker, situation):
             if self._meets_another(blocker, offset, situation.scene):
                 continue
             if not offset:
                 return None
-            plateau = self._reached(blocker, offset, situation)
-            if plateau.begin <= blocker.high or offset == self._held_offset(blocker.track):
+            soonest = self._reached(blocker, offset, situation)
+            if offset == self._held_offset(blocker.track):
+                return soonest
+            roomy = roomy_length(situation.lateral, offset, soonest.begin, situation.window, self._shape)
+            begin = max(soonest.begin, min(roomy, latest))
+            plateau = Plateau(begin, max(soonest.end, begin), offset)
+            if roomy <= begin <= blocker.high:
                 return plateau
             late.append(plateau)
         if self._clears(blocker, 0.0):
             return None
         if blocker.track in self._held and blocker.low < self._shape.front:
             return self._reached(blocker, self._held_offset(blocker.track), situation)
-        return None if blocker.walks else min(late, default=None)
+        return None if blocker.walks else min(late, key=lambda plateau: abs(plateau.offset), default=None)
 
     def _reached(self, blocker: Blocker, offset: float, situation: Situation) -> Plateau:
-        """Where the offset has to be reached and left. A move once begun later than that ends where it did before.
-
-        Where there is little room, the front may be beside the object in the second half of the move: turned outwards,
-        it is at least as far aside as the rear axle is going to be.
-        """
-        room = blocker.low - self._shape.front
-        begin = room - LENGTHWISE
+        """Where the offset can be reached and left. A move once begun later than that ends where it did before."""
+        begin = blocker.low - self._shape.front - LENGTHWISE
         end = blocker.high + self._shape.rear_overhang + LENGTHWISE
         end += blocker.speed * end / max(situation.speed - blocker.speed, SLOWEST)
         if offset == self._held_offset(blocker.track):
             begin = max(begin, self._held[blocker.track].begin - situation.window.station)
         else:
-            begin = max(begin, min(room + min(room, self._shape.front), _GENTLE))
-            begin = max(begin, feasible_length(situation.lateral, offset, begin, situation.speed, self._config))
+            begin = feasible_length(situation.lateral, offset, begin, situation.speed, self._config)
         return Plateau(begin, max(end, begin), offset)
 
     def _choices(self, blocker: Blocker, situation: Situation) -> Iterator[float]:
@@ -150,7 +155,7 @@ class NudgeDecider:
             yield from (self._sparing(blocker, offset, situation) for offset in inside if self._clears(blocker, offset))
         for offset in wanted:
             if not self._meets_another(blocker, offset, situation.scene):
-                tight = tightened(blocker, offset, self._config)
+                tight = self._tightened(blocker, offset, situation.scene)
                 if self._may_leave_lane(blocker, tight, begun, situation):
                     yield tight
 
@@ -163,13 +168,30 @@ class NudgeDecider:
 
     def _meets_another(self, blocker: Blocker, offset: float, scene: Scene) -> bool:
         """Whether another standing object leaves no room at that offset, alongside this one."""
+        gaps = scene.now.gaps(np.asarray(offset + blocker.swept_left), np.asarray(offset + blocker.swept_right))
+        is_near = gaps < self._config.nudge_clearance_least - 1e-6
+        return bool((self._standing_alongside(blocker, scene) & is_near).any())
+
+    def _tightened(self, blocker: Blocker, offset: float, scene: Scene) -> float:
+        """The offset on the same side that leaves the least clearance to this one, and to others who stand there [m].
+
+        That is 0 where none is needed, and at most `offset`.
+        """
+        now, side = scene.now, math.copysign(1.0, offset)
+        body = blocker.swept_right if offset > 0.0 else blocker.swept_left
+        gaps = side * (offset + body - now.offsets) - now.half_widths
+        passed = gaps[self._standing_alongside(blocker, scene) & (gaps > 0.0)]
+        spare = float(passed.min(initial=blocker.clearance(offset))) - self._config.nudge_clearance_least
+        return offset - side * min(max(spare, 0.0), abs(offset))
+
+    def _standing_alongside(self, blocker: Blocker, scene: Scene) -> Flags:
+        """Which others stand where the ego is while it passes this one."""
         now = scene.now
         low = blocker.low - self._shape.front - now.half_lengths - LENGTHWISE
         high = blocker.high + self._shape.rear_overhang + now.half_lengths + LENGTHWISE
-        alongside = scene.is_standing & (now.stations > low) & (now.stations < high)
+        alongside: Flags = scene.is_standing & (now.stations > low) & (now.stations < high)
         alongside[blocker.row] = False
-        gaps = now.gaps(np.asarray(offset + blocker.swept_left), np.asarray(offset + blocker.swept_right))
-        return bool((alongside & (gaps < self._config.nudge_clearance_least - 1e-6)).any())
+        return alongside
 
     def _may_leave_lane(self, blocker: Blocker, offset: float, begun: float, situation: Situation) -> bool:
         """For what will not move by itself, when the other lane is free; always to finish what was `begun`.
@@ -262,7 +284,7 @@ class NudgeDecider:
         scene, least = situation.scene, self._config.nudge_clearance_least
         is_beyond = (scene.futures.offsets[: scene.moving, 0] - offset) * offset > 0.0
         if is_beyond.any() and (is_beyond & self._alongside(blocker, offset, least, situation)).any():
-            return tightened(blocker, offset, self._config)
+            return self._tightened(blocker, offset, scene)
         return offset
 
     def _alongside(self, blocker: Blocker, offset: float, margin: float, situation: Situation) -> Flags:

@@ -91,6 +91,18 @@ def feasible_length(state: Lateral, target: float, length: float, speed: float, 
         length *= _STRETCH
 
 
+def front_offsets(state: Lateral, target: float, length: float, front: float) -> list[tuple[float, float]]:
+    """Where the middle of the front, so far ahead of the rear axle, comes during a move: stations and offsets [m]."""
+    first, second = state.slope * length, 0.5 * state.bend * length * length
+    third, fourth, fifth = _upper_terms(target - state.offset, first, second)
+    found = []
+    for u in _SAMPLES:
+        risen = u * (first + u * (second + u * (third + u * (fourth + u * fifth))))
+        slope = first + u * (2.0 * second + u * (3.0 * third + u * (4.0 * fourth + u * 5.0 * fifth)))
+        found.append((u * length + front, state.offset + risen + front * slope / length))
+    return found
+
+
 def path_along(
     window: Window,
     start: StartState,

@@ -9,13 +9,27 @@ import pytest
 from planned_drives import SHAPE, Actor, Drive, assert_drivable, car, cone, curve_points, drive, person, road, stop_line
 
 from dvca_sumo.geometry.boxes import box_of, outlines
-from dvca_sumo.messages import ObjectClass
-from dvca_sumo.roadmap.route import Control
+from dvca_sumo.messages import Floats, ObjectClass
+from dvca_sumo.roadmap.route import Control, Route
 from dvca_sumo.stack.planning import PlanningConfig
 
 
 def offsets(driven: Drive) -> tuple[float, float]:
     return float(driven.states[:, 2].min()), float(driven.states[:, 2].max())
+
+
+def front_left(driven: Drive) -> Floats:
+    """The offset of that corner of the body, on a straight road along x."""
+    headings = driven.states[:, 3]
+    corners: Floats = driven.states[:, 2] + SHAPE.front * np.sin(headings) + 0.5 * SHAPE.width * np.cos(headings)
+    return corners
+
+
+def sweeps(driven: Drive, route: Route) -> Floats:
+    """Offsets from the line of the body's outline, over the whole drive."""
+    bodies = np.array([box_of(x, y, heading, SHAPE) for x, y, heading in driven.states[:, 1:4].tolist()])
+    _, across = route.line.project(outlines(bodies, 6).reshape(-1, 2))
+    return across
 
 
 @pytest.mark.parametrize("side", [0.0, -0.5, -1.2])
@@ -75,10 +89,19 @@ def test_ego_that_pulls_out_keeps_its_front_on_the_road() -> None:
     driven = drive(road(), 20.0, actors=[van])
     assert driven.clearances.min() > 0.4
     assert driven.fronts[-1] > 80.0
-    headings = driven.states[:, 3]
-    corners = driven.states[:, 2] + SHAPE.front * np.sin(headings) + 0.5 * SHAPE.width * np.cos(headings)
-    assert corners.max() < 1.6
+    assert front_left(driven).max() < 1.62
     assert_drivable(driven)
+
+
+@pytest.mark.parametrize(("beside", "ahead"), [(-1.75, 5.0), (-1.75, 7.0), (-1.95, 5.0), (-1.95, 9.0)])
+def test_ego_that_sets_off_does_not_swing_out_over_the_edge_for_who_comes_along_the_other_one(
+    beside: float, ahead: float
+) -> None:
+    walker = person(5, 20.0 + SHAPE.front + ahead, beside, heading=math.pi, speed=1.3)
+    driven = drive(road(limit=8.0), 12.0, station=20.0, actors=[walker])
+    assert front_left(driven).max() < 1.62
+    assert driven.clearances.min() > 0.5
+    assert driven.fronts[-1] > 90.0
 
 
 @pytest.mark.parametrize(("gap", "x", "most"), [(0.2, 9.8, 0.25), (0.5, 9.0, 0.0)])
@@ -334,11 +357,29 @@ def test_body_that_swings_out_in_a_bend_stays_on_the_road_when_it_passes_a_perso
     x, y, heading = route.line.poses(np.array([70.0 + 0.3 * radius]))[0].tolist()
     inside = person(3, x - beside * math.sin(heading), y + beside * math.cos(heading))
     driven = drive(route, 25.0, speed=6.0, station=30.0, actors=[inside])
-    bodies = np.array([box_of(x, y, heading, SHAPE) for x, y, heading in driven.states[:, 1:4].tolist()])
-    _, offsets = route.line.project(outlines(bodies, 6).reshape(-1, 2))
-    assert offsets.min() > -1.65
+    assert sweeps(driven, route).min() > -1.65
     assert driven.clearances.min() > 0.35
     assert (driven.states[-1, 2] > 50.0) == (beside > 1.5)
+
+
+@pytest.mark.parametrize("beside", [1.45, 1.55])
+@pytest.mark.parametrize("station", [60.0, 63.0])
+@pytest.mark.parametrize("radius", [6.5, 8.0])
+def test_for_people_who_stand_beside_it_on_the_inside_of_a_bend_the_ego_moves_as_little_as_it_can(
+    radius: float, station: float, beside: float
+) -> None:
+    """Each of them would be passed with what all need, not one of them with all the clearance wanted."""
+    route = road(curve_points(radius, before=60.0))
+    route = msgspec.structs.replace(route, road_right=route.road_right - 2.4)
+    people = []
+    for track, (ahead, farther) in enumerate([(1.5, 0.2), (2.0, 0.0), (2.4, 0.12), (2.9, 0.02)]):
+        x, y, heading = route.line.poses(np.array([station + ahead]))[0].tolist()
+        aside = beside + farther
+        people.append(person(track, x - aside * math.sin(heading), y + aside * math.cos(heading)))
+    driven, alone = (drive(route, 20.0, station=station, actors=actors) for actors in (people, []))
+    assert sweeps(driven, route).min() > sweeps(alone, route).min() - 0.2
+    assert driven.clearances.min() > 0.25
+    assert driven.states[-1, 2] > 100.0
 
 
 @pytest.mark.parametrize("station", [62.0, 68.0, 72.0])
