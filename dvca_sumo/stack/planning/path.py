@@ -1,8 +1,8 @@
 """The path: the reference line moved sideways by minimum-jerk blends, and the room the ego's body needs on it."""
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
@@ -22,6 +22,9 @@ _STEEPEST = 0.55  # [rad] largest angle between path and reference line
 _SHARPEST = 0.25  # [1/m] largest initial second derivative taken over from the start state
 _UNDERWAY = 1.5  # of a move's length: a move begun early, because the ego was faster then, is not taken back
 _FADE: Floats = np.exp(np.arange(30) / -5.0)  # by station: how much is left of what projection missed the start by
+
+_Terms = tuple[float, float, float, float, float]
+_Number = TypeVar("_Number", float, Floats)
 
 
 class Plateau(NamedTuple):
@@ -83,24 +86,19 @@ def feasible_length(state: Lateral, target: float, length: float, speed: float, 
     sharpest = max(_TOLERANCE * sharpest, abs(state.bend))
     length = max(length, _SHORTEST_REST)
     while True:
-        first, second = state.slope * length, 0.5 * state.bend * length * length
-        third, fourth, fifth = _upper_terms(target - state.offset, first, second)
+        _, second, third, fourth, fifth = _terms(state, target, length)
         peak = max(abs(2.0 * second + u * (6.0 * third + u * (12.0 * fourth + u * 20.0 * fifth))) for u in _SAMPLES)
         if peak <= sharpest * length * length:
             return length
         length *= _STRETCH
 
 
-def front_offsets(state: Lateral, target: float, length: float, front: float) -> list[tuple[float, float]]:
+def front_offsets(state: Lateral, target: float, length: float, front: float) -> Iterator[tuple[float, float]]:
     """Where the middle of the front, so far ahead of the rear axle, comes during a move: stations and offsets [m]."""
-    first, second = state.slope * length, 0.5 * state.bend * length * length
-    third, fourth, fifth = _upper_terms(target - state.offset, first, second)
-    found = []
+    terms = _terms(state, target, length)
     for u in _SAMPLES:
-        risen = u * (first + u * (second + u * (third + u * (fourth + u * fifth))))
-        slope = first + u * (2.0 * second + u * (3.0 * third + u * (4.0 * fourth + u * 5.0 * fifth)))
-        found.append((u * length + front, state.offset + risen + front * slope / length))
-    return found
+        risen, slope = _risen(terms, u)
+        yield u * length + front, state.offset + risen + front * slope / length
 
 
 def path_along(
@@ -193,21 +191,31 @@ def _blend(state: Lateral, target: float, length: float, along: Floats) -> tuple
 
     Offset and slope at distances `along` (2, n), and the bend at the first of them.
     """
-    first, second = state.slope * length, 0.5 * state.bend * length * length
-    third, fourth, fifth = _upper_terms(target - state.offset, first, second)
-    u = along / length
+    terms, u = _terms(state, target, length), along / length
+    risen, slopes = _risen(terms, u)
     blend = np.empty((2, len(u)))
-    blend[0] = state.offset + u * (first + u * (second + u * (third + u * (fourth + u * fifth))))
-    blend[1] = (first + u * (2.0 * second + u * (3.0 * third + u * (4.0 * fourth + u * (5.0 * fifth))))) / length
+    np.add(risen, state.offset, out=blend[0])
+    np.divide(slopes, length, out=blend[1])
+    _, second, third, fourth, fifth = terms
     begin = float(u[0])
     bend = 2.0 * second + begin * (6.0 * third + begin * (12.0 * fourth + begin * (20.0 * fifth)))
     return blend, bend / (length * length)
 
 
-def _upper_terms(rise: float, first: float, second: float) -> tuple[float, float, float]:
-    """Coefficients of u^3, u^4, u^5 of a quintic that rises by `rise` from u = 0 to rest at u = 1."""
-    gap = rise - first - second
+def _terms(state: Lateral, target: float, length: float) -> _Terms:
+    """Coefficients of u ... u^5 of the quintic that rises from `state`, at u = 0, to rest at `target`, at u = 1."""
+    first, second = state.slope * length, 0.5 * state.bend * length * length
+    gap = target - state.offset - first - second
     slope_gap, bend_gap = -first - 2.0 * second, -2.0 * second
     third = 10.0 * gap - 4.0 * slope_gap + 0.5 * bend_gap
     fourth = -15.0 * gap + 7.0 * slope_gap - bend_gap
-    return third, fourth, 6.0 * gap - 3.0 * slope_gap + 0.5 * bend_gap
+    return first, second, third, fourth, 6.0 * gap - 3.0 * slope_gap + 0.5 * bend_gap
+
+
+def _risen(terms: _Terms, u: _Number) -> tuple[_Number, _Number]:
+    """The quintic without its value at u = 0, and its derivative by u."""
+    first, second, third, fourth, fifth = terms
+    return (
+        u * (first + u * (second + u * (third + u * (fourth + u * fifth)))),
+        first + u * (2.0 * second + u * (3.0 * third + u * (4.0 * fourth + u * (5.0 * fifth)))),
+    )
