@@ -10,9 +10,9 @@ from dvca_sumo.messages import Floats, ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.blockers import LENGTHWISE, PARALLEL, SLOWEST, Blocker, blockers
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
-from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length, feasible_length
+from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length, feasible_length, roomy_length
 from dvca_sumo.stack.planning.reference import Window
-from dvca_sumo.stack.planning.room import room_beside, roomy_length
+from dvca_sumo.stack.planning.room import room_beside
 from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags, Scene
 
 _VEHICLE, _PERSON, _STATIC = (int(kind) for kind in (ObjectClass.VEHICLE, ObjectClass.PEDESTRIAN, ObjectClass.STATIC))
@@ -105,7 +105,7 @@ class NudgeDecider:
             soonest = self._reached(blocker, offset, situation)
             if offset == self._held_offset(blocker.track):
                 return soonest
-            roomy = roomy_length(situation.lateral, offset, soonest.begin, situation.window, self._shape)
+            roomy = roomy_length(situation.lateral, offset, 0.0, soonest.begin, situation.window, self._shape)
             begin = max(soonest.begin, min(roomy, latest))
             plateau = Plateau(begin, max(soonest.end, begin), offset)
             if roomy <= begin <= blocker.high:

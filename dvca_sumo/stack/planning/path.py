@@ -16,9 +16,13 @@ _PEAK = 5.7735  # highest second derivative of a minimum-jerk blend of size 1 ov
 _SHORTEST_BLEND = 6.0  # [m]
 _SHORTEST_REST = 1.0  # [m] of a move that is nearly done
 _STRETCH = 1.1
+_LONGEST = 20.0  # [m] of a move: on more, the front hardly swings out
+OVER_LINE = 0.1  # [m] over the lane marking is not yet another lane
+_AT_REST = 0.2  # [m] less than that does not make the front swing out
 _TOLERANCE = 1.1  # of curvature, so that a move found feasible is found so again from every point on it
 _SAMPLES = (0.15, 0.3, 0.5, 0.7, 0.85)
 _STEEPEST = 0.55  # [rad] largest angle between path and reference line
+_STANDING = 0.05  # [m/s]
 _SHARPEST = 0.25  # [1/m] largest initial second derivative taken over from the start state
 _UNDERWAY = 1.5  # of a move's length: a move begun early, because the ego was faster then, is not taken back
 _FADE: Floats = np.exp(np.arange(30) / -5.0)  # by station: how much is left of what projection missed the start by
@@ -64,13 +68,18 @@ class Path(msgspec.Struct, frozen=True, eq=False):
 
 
 def lateral_start(start: StartState, window: Window, offset: float) -> Lateral:
-    """The start state relative to the reference line at the window's origin."""
+    """The start state relative to the reference line at the window's origin.
+
+    An ego that stands turns its wheels where it is, and is not bound to how they are turned.
+    """
     curvature = float(window.curvatures[BEHIND])
     scale = max(1.0 - curvature * offset, 0.2)
     angle = math.remainder(start.heading - float(window.headings[BEHIND]), 2.0 * math.pi)
     tangent = math.tan(min(max(angle, -_STEEPEST), _STEEPEST))
     cosine = 1.0 / math.hypot(1.0, tangent)
     bend = (start.curvature * scale / cosine - curvature) * scale / (cosine * cosine)
+    if start.speed < _STANDING:
+        bend = 0.0
     return Lateral(offset, scale * tangent, min(max(bend, -_SHARPEST), _SHARPEST))
 
 
@@ -93,12 +102,33 @@ def feasible_length(state: Lateral, target: float, length: float, speed: float, 
         length *= _STRETCH
 
 
-def front_offsets(state: Lateral, target: float, length: float, front: float) -> Iterator[tuple[float, float]]:
-    """Where the middle of the front, so far ahead of the rear axle, comes during a move: stations and offsets [m]."""
-    terms = _terms(state, target, length)
-    for u in _SAMPLES:
-        risen, slope = _risen(terms, u)
-        yield u * length + front, state.offset + risen + front * slope / length
+def roomy_length(
+    state: Lateral, target: float, begin: float, length: float, window: Window, shape: VehicleShape
+) -> float:
+    """`length` [m] of a move from `state`, at station `begin`, to `target`, or more: the front is not to swing out.
+
+    That is out of the lane, for a target within it, or else out of the road; where it is out already, or is to be, no
+    farther. Infinite where no length does it.
+    """
+    left = target > state.offset
+    side, body = (1.0, window.swept_left) if left else (-1.0, window.swept_right)
+    lane, road = (window.lane_left, window.road_left) if left else (window.lane_right, window.road_right)
+    least = max(side * target, side * (state.offset + shape.front * state.slope))
+    if length >= _LONGEST:
+        return length
+    while length < _LONGEST:
+        for ahead, offset in _front_offsets(state, target, length, shape.front):
+            row = min(int(begin + ahead) + BEHIND, len(body) - 1)
+            room = side * float(road[row] - body[row])
+            in_lane = side * float(lane[row] - body[row]) + OVER_LINE
+            if side * target <= in_lane:
+                room = min(room, in_lane)
+            if side * offset > max(room, least):
+                break
+        else:
+            return length
+        length *= _STRETCH
+    return math.inf
 
 
 def path_along(
@@ -111,7 +141,7 @@ def path_along(
 ) -> Path:
     """From the start state onto the reference line, or onto the plateaus where there are any."""
     count = window.rows.shape[1] - BEHIND
-    (offsets, slopes), bend = _profile(lateral, plateaus, start.speed, count, config)
+    (offsets, slopes), bend = _profile(_blends(lateral, plateaus, start.speed, window, shape, config), lateral, count)
     line = window.rows[:6, BEHIND:]
     _, _, cosines, sines, line_headings, line_curvatures = line
     points = np.empty((2, count))
@@ -136,13 +166,11 @@ def path_along(
     return Path(x, y, headings, (line_curvatures + turns) * cosines_to_line / scale, arcs, *sides)
 
 
-def _profile(
-    lateral: Lateral, plateaus: Sequence[Plateau], speed: float, count: int, config: PlanningConfig
-) -> tuple[Floats, float]:
+def _profile(blends: list[tuple[float, float, float]], lateral: Lateral, count: int) -> tuple[Floats, float]:
     """Offset and slope at stations 0 ... count-1 (2, count), by holds and blends between; the bend at station 0."""
     profile, bend = np.zeros((2, count)), 0.0
     position, state = 0.0, lateral
-    for begin, end, target in _blends(lateral, plateaus, speed, config):
+    for begin, end, target in blends:
         first, last = math.ceil(begin), min(math.ceil(end), count)
         profile[0, math.ceil(position) : first] = state.offset
         if first < last:
@@ -155,7 +183,12 @@ def _profile(
 
 
 def _blends(
-    lateral: Lateral, plateaus: Sequence[Plateau], speed: float, config: PlanningConfig
+    lateral: Lateral,
+    plateaus: Sequence[Plateau],
+    speed: float,
+    window: Window,
+    shape: VehicleShape,
+    config: PlanningConfig,
 ) -> list[tuple[float, float, float]]:
     """Begin, end and target of each sideways move, in order.
 
@@ -163,27 +196,41 @@ def _blends(
     it gives the same curve. The ego returns to its lane between plateaus where that takes less than the way.
     """
     blends: list[tuple[float, float, float]] = []
-    position, offset, state = 0.0, lateral.offset, lateral
-    unsettled = lateral.unsettled
+    position, state, unsettled = 0.0, lateral, lateral.unsettled
     for plateau in plateaus:
-        length = blend_length(max(abs(plateau.offset - offset), unsettled), speed, config)
-        back = blend_length(max(abs(offset), unsettled), speed, config)
-        back = feasible_length(state, 0.0, back, speed, config)
-        is_underway = not blends and offset * plateau.offset > 0.0
+        length = blend_length(max(abs(plateau.offset - state.offset), unsettled), speed, config)
+        back = _way_back(state, position, speed, window, shape, config)
+        is_underway = not blends and state.offset * plateau.offset > 0.0
         if plateau.begin - (_UNDERWAY * length if is_underway else length) > position + back:
             blends.append((position, position + back, 0.0))
-            position, offset, unsettled = position + back, 0.0, 0.0
-            state = _CENTRED
+            position, state, unsettled = position + back, _CENTRED, 0.0
             length = blend_length(plateau.offset, speed, config)
         begin = max(position, plateau.begin - length) if blends else position
         reached = begin + feasible_length(state, plateau.offset, plateau.begin - begin, speed, config)
         blends.append((begin, reached, plateau.offset))
-        position, offset, unsettled = max(plateau.end, reached), plateau.offset, 0.0
-        state = Lateral(offset, 0.0, 0.0)
-    back = blend_length(max(abs(offset), unsettled), speed, config)
-    back = feasible_length(state, 0.0, back, speed, config)
+        position, state, unsettled = max(plateau.end, reached), Lateral(plateau.offset, 0.0, 0.0), 0.0
+    back = _way_back(state, position, speed, window, shape, config)
     blends.append((position, position + back, 0.0))
     return blends
+
+
+def _way_back(
+    state: Lateral, begin: float, speed: float, window: Window, shape: VehicleShape, config: PlanningConfig
+) -> float:
+    """How long the move back to the line is [m]."""
+    length = feasible_length(state, 0.0, blend_length(state.unsettled, speed, config), speed, config)
+    if state.unsettled > _AT_REST:
+        roomy = roomy_length(state, 0.0, begin, length, window, shape)
+        return roomy if roomy < math.inf else length
+    return length
+
+
+def _front_offsets(state: Lateral, target: float, length: float, front: float) -> Iterator[tuple[float, float]]:
+    """Where the middle of the front, so far ahead of the rear axle, comes during a move: stations and offsets [m]."""
+    terms = _terms(state, target, length)
+    for u in _SAMPLES:
+        risen, slope = _risen(terms, u)
+        yield u * length + front, state.offset + risen + front * slope / length
 
 
 def _blend(state: Lateral, target: float, length: float, along: Floats) -> tuple[Floats, float]:

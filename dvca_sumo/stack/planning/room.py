@@ -8,12 +8,8 @@ import numpy as np
 from dvca_sumo.messages import Floats, VehicleShape
 from dvca_sumo.stack.planning.blockers import Blocker
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.path import Lateral, blend_length, front_offsets
-from dvca_sumo.stack.planning.reference import BEHIND, Window
-
-_OVER_LINE = 0.1  # [m] over the lane marking is not yet another lane
-_STRETCH = 1.1
-_LONGEST = 20.0  # [m] of a move: on more, the front hardly swings out
+from dvca_sumo.stack.planning.path import OVER_LINE, blend_length
+from dvca_sumo.stack.planning.reference import Window
 
 
 class Room(NamedTuple):
@@ -42,35 +38,10 @@ def room_beside(
         begin = max(begin - blend, 0.0)
     beside = window.span(begin, end)
     return Room(
-        float((window.lane_left - window.swept_left)[beside].min()) + _OVER_LINE,
-        float((window.lane_right - window.swept_right)[beside].max()) - _OVER_LINE,
+        float((window.lane_left - window.swept_left)[beside].min()) + OVER_LINE,
+        float((window.lane_right - window.swept_right)[beside].max()) - OVER_LINE,
         _wanted(blocker, window, whole, least, shape, config),
     )
-
-
-def roomy_length(state: Lateral, target: float, length: float, window: Window, shape: VehicleShape) -> float:
-    """`length` [m] of a move aside from `state` to `target` [m], or more: as far as the front swings out.
-
-    That is out of the lane, for a target within it, or else out of the road. Where the front is out already, or is to
-    be, that is no reason.
-    """
-    left = target > state.offset
-    side, body = (1.0, window.swept_left) if left else (-1.0, window.swept_right)
-    lane, road = (window.lane_left, window.road_left) if left else (window.lane_right, window.road_right)
-    least = max(side * target, side * (state.offset + shape.front * state.slope))
-    while length < _LONGEST:
-        for station, offset in front_offsets(state, target, length, shape.front):
-            row = min(int(station) + BEHIND, len(body) - 1)
-            room = side * float(road[row] - body[row])
-            in_lane = side * float(lane[row] - body[row]) + _OVER_LINE
-            if side * target <= in_lane:
-                room = min(room, in_lane)
-            if side * offset > max(room, least):
-                break
-        else:
-            return length
-        length *= _STRETCH
-    return length
 
 
 def _wanted(

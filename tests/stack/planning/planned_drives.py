@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from dvca_sumo.geometry.boxes import box_of, distances
+from dvca_sumo.geometry.boxes import box_of, distances, outlines
 from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import (
     PREDICTION_TIMES,
@@ -184,13 +184,15 @@ def drive(
     *,
     speed: float = 0.0,
     station: float = 5.0,
+    aside: float = 0.0,
     actors: Sequence[Actor] = (),
     signals: Callable[[float], dict[str, SignalColour]] = lambda _: {},
     config: PlanningConfig | None = None,
 ) -> Drive:
-    """Drive from `station` (rear axle) at `speed`, following every trajectory exactly."""
+    """Drive from `station` (rear axle), so far `aside` of the line, at `speed`, following every trajectory exactly."""
     planner = Planner(config or PlanningConfig(), route, SHAPE)
     x, y, heading = route.line.poses(np.array([station]))[0].tolist()
+    x, y = x - aside * math.sin(heading), y + aside * math.cos(heading)
     estimate = LocalizationEstimate(0.0, x, y, heading, speed, 0.0, 0.0)
     states, trajectories, clearances = [], [], []
     for index in range(round(seconds * 10)):
@@ -204,6 +206,13 @@ def drive(
         _, x, y, heading, speed, acceleration, curvature = trajectory.points[1].tolist()
         estimate = LocalizationEstimate(0.1 * (index + 1), x, y, heading, speed, acceleration, speed * curvature)
     return Drive(np.array(states), trajectories, np.array(clearances))
+
+
+def sweeps(driven: Drive, route: Route) -> Floats:
+    """Offsets from the line of the body's outline, over the whole drive."""
+    bodies = np.array([box_of(x, y, heading, SHAPE) for x, y, heading in driven.states[:, 1:4].tolist()])
+    _, across = route.line.project(outlines(bodies, 6).reshape(-1, 2))
+    return across
 
 
 def assert_drivable(driven: Drive, config: PlanningConfig | None = None) -> None:

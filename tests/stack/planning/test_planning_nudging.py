@@ -6,11 +6,23 @@ from itertools import pairwise
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import SHAPE, Actor, Drive, assert_drivable, car, cone, curve_points, drive, person, road, stop_line
+from planned_drives import (
+    SHAPE,
+    Actor,
+    Drive,
+    assert_drivable,
+    car,
+    cone,
+    curve_points,
+    drive,
+    person,
+    road,
+    stop_line,
+    sweeps,
+)
 
-from dvca_sumo.geometry.boxes import box_of, outlines
 from dvca_sumo.messages import Floats, ObjectClass
-from dvca_sumo.roadmap.route import Control, Route
+from dvca_sumo.roadmap.route import Control
 from dvca_sumo.stack.planning import PlanningConfig
 
 
@@ -23,13 +35,6 @@ def front_left(driven: Drive) -> Floats:
     headings = driven.states[:, 3]
     corners: Floats = driven.states[:, 2] + SHAPE.front * np.sin(headings) + 0.5 * SHAPE.width * np.cos(headings)
     return corners
-
-
-def sweeps(driven: Drive, route: Route) -> Floats:
-    """Offsets from the line of the body's outline, over the whole drive."""
-    bodies = np.array([box_of(x, y, heading, SHAPE) for x, y, heading in driven.states[:, 1:4].tolist()])
-    _, across = route.line.project(outlines(bodies, 6).reshape(-1, 2))
-    return across
 
 
 @pytest.mark.parametrize("side", [0.0, -0.5, -1.2])

@@ -3,7 +3,8 @@
 import math
 
 import numpy as np
-from planned_drives import SHAPE, believed, car, curve_points, drive, predicted, road
+import pytest
+from planned_drives import SHAPE, believed, car, curve_points, drive, predicted, road, sweeps
 
 from dvca_sumo.messages import TRAJECTORY_TIMES, Trajectory
 from dvca_sumo.stack.planning import Planner, PlanningConfig
@@ -52,6 +53,18 @@ def test_ego_beside_its_lane_is_led_back_to_it() -> None:
     assert abs(points[-1, 2]) < 0.01
     assert points[:, 2].max() < 2.5
     assert np.abs(points[:, 6]).max() < 0.15
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.45])
+@pytest.mark.parametrize("station", [66.0, 69.0])
+@pytest.mark.parametrize("radius", [6.5, 8.0])
+def test_ego_that_sets_off_in_a_bend_swings_out_no_farther_than_one_that_comes_along(
+    radius: float, station: float, aside: float
+) -> None:
+    route = road(curve_points(radius, before=60.0), limit=8.0)
+    comes_along = sweeps(drive(route, 15.0, station=40.0), route)
+    sets_off = sweeps(drive(route, 10.0, station=station, aside=aside), route)
+    assert sets_off.min() > comes_along.min() - 0.05
 
 
 def test_ego_that_points_away_from_the_line_is_led_back_slowly() -> None:
