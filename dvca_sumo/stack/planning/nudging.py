@@ -87,13 +87,13 @@ class NudgeDecider:
     def _plateau(self, blocker: Blocker, situation: Situation) -> Plateau | None:
         """Where and how far to move aside; None where there is no way round, or where none is needed.
 
-        Where it cannot be reached before the object is passed, the front staying on the road, it is the smallest move
-        possible, if one is needed at all; not for who walks. Beside it, the ego does not turn back towards it, however
-        little room it has.
+        Where it cannot be reached before the object is passed, the front staying in the lane or on the road, it is the
+        smallest move possible, if one is needed at all; not for who walks. Beside it, the ego does not turn back
+        towards it, however little room it has.
         """
         late = []
-        latest = blocker.high
-        if not self._clears(blocker, 0.0):
+        latest, is_clear = blocker.high, self._clears(blocker, 0.0)
+        if not is_clear:
             # In the second half of the move, the front, turned outwards, is as far aside as the ego is going to be.
             room = blocker.low - self._shape.front
             latest = min(room + min(room, self._shape.front), latest)
@@ -111,7 +111,7 @@ class NudgeDecider:
             if roomy <= begin <= blocker.high:
                 return plateau
             late.append(plateau)
-        if self._clears(blocker, 0.0):
+        if is_clear:
             return None
         if blocker.track in self._held and blocker.low < self._shape.front:
             return self._reached(blocker, self._held_offset(blocker.track), situation)
