@@ -1,10 +1,12 @@
 """What may have to be passed: who stands in the way or close to it, or walks along the road there."""
 
 from collections.abc import Collection
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
+from dvca_sumo.geometry.boxes import outlines
 from dvca_sumo.messages import Floats, ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.reference import BEHIND, Window
@@ -16,9 +18,26 @@ PARALLEL = 0.95  # cosine of the smallest angle (18 degrees) to the line at whic
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
 _SEEN_LATE = 20.0  # [m] before the end of the window, objects are not yet decided about
+_DOUBT = 1.0  # [m] that extents of who stands aslant, or beside a bend, may be less than it is
+_PARTS = 4  # of each side of an outline
 
 
-class Blocker(msgspec.Struct, frozen=True):
+class Beside(NamedTuple):
+    """Objects beside the ego's way, bends and their own angle to it counted in; all arrays (n,).
+
+    Offsets of the rear axle at which the body, keeping its distance to the line, touches them.
+    """
+
+    right: Floats  # [m] passing on their right
+    left: Floats  # [m] on their left
+
+    def clearances(self, offset: float) -> Floats:
+        """Between body and each object, the ego passing at `offset` [m]; negative where they would overlap."""
+        gaps: Floats = np.maximum(self.right - offset, offset - self.left)
+        return gaps
+
+
+class Blocker(msgspec.Struct, frozen=True, eq=False):
     """What the ego passes in or close to its way, in window coordinates: where it is while the ego passes."""
 
     track: int
@@ -26,16 +45,15 @@ class Blocker(msgspec.Struct, frozen=True):
     speed: float  # [m/s]
     low: float  # [m] stations
     high: float  # [m]
-    right: float  # [m] offsets
-    left: float  # [m]
-    swept_right: float  # [m] of the body where it passes the object, its rear axle on the line: negative
-    swept_left: float  # [m]
+    right: float  # [m] offset of the rear axle at which the body touches it, passing on its right
+    left: float  # [m] on its left
     wanted: float  # [m] sideways clearance
     walks: bool  # along the road
+    others: Beside  # who else stands where the ego is while it passes this one
 
     def clearance(self, offset: float) -> float:
         """Between body and object, the ego passing at `offset` [m]; negative where they would overlap."""
-        return max(self.right - self.swept_left - offset, offset + self.swept_right - self.left)
+        return max(self.right - offset, offset - self.left)
 
 
 def blockers(
@@ -64,32 +82,49 @@ def blockers(
     is_beside = is_held & (now.stations - now.half_lengths < shape.front + way)
     rows = now.rows(window)
     swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
-    near = now.gaps(swept_left, swept_right) < wanted + config.nudge_hold * is_held
+    limits = wanted + config.nudge_hold * is_held
+    near = now.gaps(swept_left, swept_right) < limits + _DOUBT
     near &= scene.is_standing | is_beside | walks
     near &= now.stations + now.half_lengths > -shape.rear_overhang - LENGTHWISE
     near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
     if not near.any():
         return []
+    beside = _beside(scene, window, near | scene.is_standing)
+    near &= beside.clearances(0.0) < limits
     met = _met(now.stations, np.where(walks, scene.speeds * now.directions, 0.0), speed, config.acceleration)
     lows = np.minimum(now.stations, met) - now.half_lengths
     highs = met + now.half_lengths
-    found = [
-        Blocker(
-            scene.ids[row],
-            row,
-            float(speeds[row]),
-            float(lows[row]),
-            float(highs[row]),
-            float(now.offsets[row] - now.half_widths[row]),
-            float(now.offsets[row] + now.half_widths[row]),
-            float(swept_right[row]),
-            float(swept_left[row]),
-            float(wanted[row]),
-            bool(walks[row]),
+    found = []
+    for row in near.nonzero()[0].tolist():
+        low, high = float(lows[row]), float(highs[row])
+        alongside = scene.is_standing & (now.stations + now.half_lengths > low - shape.front - LENGTHWISE)
+        alongside &= now.stations - now.half_lengths < high + shape.rear_overhang + LENGTHWISE
+        alongside[row] = False
+        found.append(
+            Blocker(
+                track=scene.ids[row],
+                row=row,
+                speed=float(speeds[row]),
+                low=low,
+                high=high,
+                right=float(beside.right[row]),
+                left=float(beside.left[row]),
+                wanted=float(wanted[row]),
+                walks=bool(walks[row]),
+                others=Beside(beside.right[alongside], beside.left[alongside]),
+            )
         )
-        for row in near.nonzero()[0].tolist()
-    ]
     return sorted(found, key=lambda blocker: blocker.low)
+
+
+def _beside(scene: Scene, window: Window, which: Flags) -> Beside:
+    """Where those of `which` (n,) are, by their outlines: of an aslant one a corner is nearest, in one place only."""
+    sides = Beside(np.full(len(which), np.inf), np.full(len(which), -np.inf))
+    stations, offsets, _ = window.project(outlines(scene.boxes[which], _PARTS).reshape(-1, 2))
+    rows = window.index(stations)
+    sides.right[which] = (offsets - window.swept_left.take(rows)).reshape(-1, 4 * _PARTS).min(axis=1)
+    sides.left[which] = (offsets - window.swept_right.take(rows)).reshape(-1, 4 * _PARTS).max(axis=1)
+    return sides
 
 
 def _walks_along(scene: Scene) -> Flags:

@@ -98,7 +98,7 @@ class NudgeDecider:
             room = blocker.low - self._shape.front
             latest = min(room + min(room, self._shape.front), latest)
         for offset in self._choices(blocker, situation):
-            if self._meets_another(blocker, offset, situation.scene):
+            if self._meets_another(blocker, offset):
                 continue
             if not offset:
                 return None
@@ -154,8 +154,8 @@ class NudgeDecider:
             inside = (min(max(offset, room.lane_right), room.lane_left) for offset in wanted)
             yield from (self._sparing(blocker, offset, situation) for offset in inside if self._clears(blocker, offset))
         for offset in wanted:
-            if not self._meets_another(blocker, offset, situation.scene):
-                tight = self._tightened(blocker, offset, situation.scene)
+            if not self._meets_another(blocker, offset):
+                tight = self._tightened(blocker, offset)
                 if self._may_leave_lane(blocker, tight, begun, situation):
                     yield tight
 
@@ -166,32 +166,19 @@ class NudgeDecider:
     def _clears(self, blocker: Blocker, offset: float) -> bool:
         return blocker.clearance(offset) >= self._config.nudge_clearance_least
 
-    def _meets_another(self, blocker: Blocker, offset: float, scene: Scene) -> bool:
+    def _meets_another(self, blocker: Blocker, offset: float) -> bool:
         """Whether another standing object leaves no room at that offset, alongside this one."""
-        gaps = scene.now.gaps(np.asarray(offset + blocker.swept_left), np.asarray(offset + blocker.swept_right))
-        is_near = gaps < self._config.nudge_clearance_least - 1e-6
-        return bool((self._standing_alongside(blocker, scene) & is_near).any())
+        return bool((blocker.others.clearances(offset) < self._config.nudge_clearance_least - 1e-6).any())
 
-    def _tightened(self, blocker: Blocker, offset: float, scene: Scene) -> float:
+    def _tightened(self, blocker: Blocker, offset: float) -> float:
         """The offset on the same side that leaves the least clearance to this one, and to others who stand there [m].
 
         That is 0 where none is needed, and at most `offset`.
         """
-        now, side = scene.now, math.copysign(1.0, offset)
-        body = blocker.swept_right if offset > 0.0 else blocker.swept_left
-        gaps = side * (offset + body - now.offsets) - now.half_widths
-        passed = gaps[self._standing_alongside(blocker, scene) & (gaps > 0.0)]
-        spare = float(passed.min(initial=blocker.clearance(offset))) - self._config.nudge_clearance_least
+        side = math.copysign(1.0, offset)
+        gaps = offset - blocker.others.left if offset > 0.0 else blocker.others.right - offset
+        spare = float(gaps[gaps > 0.0].min(initial=blocker.clearance(offset))) - self._config.nudge_clearance_least
         return offset - side * min(max(spare, 0.0), abs(offset))
-
-    def _standing_alongside(self, blocker: Blocker, scene: Scene) -> Flags:
-        """Which others stand where the ego is while it passes this one."""
-        now = scene.now
-        low = blocker.low - self._shape.front - now.half_lengths - LENGTHWISE
-        high = blocker.high + self._shape.rear_overhang + now.half_lengths + LENGTHWISE
-        alongside: Flags = scene.is_standing & (now.stations > low) & (now.stations < high)
-        alongside[blocker.row] = False
-        return alongside
 
     def _may_leave_lane(self, blocker: Blocker, offset: float, begun: float, situation: Situation) -> bool:
         """For what will not move by itself, when the other lane is free; always to finish what was `begun`.
@@ -284,7 +271,7 @@ class NudgeDecider:
         scene, least = situation.scene, self._config.nudge_clearance_least
         is_beyond = (scene.futures.offsets[: scene.moving, 0] - offset) * offset > 0.0
         if is_beyond.any() and (is_beyond & self._alongside(blocker, offset, least, situation)).any():
-            return self._tightened(blocker, offset, scene)
+            return self._tightened(blocker, offset)
         return offset
 
     def _alongside(self, blocker: Blocker, offset: float, margin: float, situation: Situation) -> Flags:

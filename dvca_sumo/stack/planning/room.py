@@ -51,13 +51,12 @@ def _wanted(
     inward_left, inward_right = _steerable(window.curvatures[span], shape, config)
     leftmost = max(min(float((window.road_left - window.swept_left)[span].min()) - edge, inward_left), 0.0)
     rightmost = min(max(float((window.road_right - window.swept_right)[span].max()) + edge, inward_right), 0.0)
-    touches_left, touches_right = blocker.left - blocker.swept_right, blocker.right - blocker.swept_left
-    left = min(max(touches_left + blocker.wanted, 0.0), leftmost)
-    right = max(min(touches_right - blocker.wanted, 0.0), rightmost)
+    left = min(max(blocker.left + blocker.wanted, 0.0), leftmost)
+    right = max(min(blocker.right - blocker.wanted, 0.0), rightmost)
     offsets = []
-    if left - touches_left >= least:
+    if left - blocker.left >= least:
         offsets.append(left)
-    if touches_right - right >= least:
+    if blocker.right - right >= least:
         offsets.append(right)
     return offsets
 

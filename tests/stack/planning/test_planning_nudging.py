@@ -21,6 +21,7 @@ from planned_drives import (
     sweeps,
 )
 
+from dvca_sumo.geometry.boxes import box_of, distances
 from dvca_sumo.messages import Floats, ObjectClass
 from dvca_sumo.roadmap.route import Control
 from dvca_sumo.stack.planning import PlanningConfig
@@ -409,6 +410,33 @@ def test_who_starts_when_the_ego_is_about_to_pass_is_passed_or_followed_without_
     assert driven.clearances.min() > 0.4
     assert driven.states[:, 5].min() > -4.0
     assert_drivable(driven)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("station", [58.0, 66.0])
+@pytest.mark.parametrize(("angle", "size"), [(0.3, (8.0, 2.4)), (0.5, (8.0, 2.4)), (0.3, (12.0, 2.5))])
+@pytest.mark.parametrize("gap", [0.3, 0.75])
+def test_who_stands_aslant_beside_a_bend_is_passed_with_the_clearance_wanted_by_its_own_outline(
+    side: float, station: float, angle: float, size: tuple[float, float], gap: float
+) -> None:
+    """On the inner side it comes nearer than its extent across the line tells, on the outer side not so near."""
+    route = road(curve_points(12.0, before=40.0))
+    route = msgspec.structs.replace(route, road_left=route.road_left + 3.2, road_right=route.road_right - 3.2)
+    east, north, along = route.line.poses(np.array([station]))[0].tolist()
+    alone = drive(route, 14.0, speed=5.0, station=20.0)
+    bodies = [box_of(x, y, heading, SHAPE) for x, y, heading in alone.states[:, 1:4].tolist()]
+
+    def bus(aside: float) -> Actor:
+        x, y = east - aside * math.sin(along), north + aside * math.cos(along)
+        return car(3, x, y, heading=along - side * angle, size=size)
+
+    def clearance(aside: float) -> float:
+        return min(float(distances(body, np.array([bus(aside).box_at(0.0)]))[0]) for body in bodies)
+
+    asides = side * np.arange(2.0, 8.0, 0.02)
+    driven = drive(route, 14.0, speed=5.0, station=20.0, actors=[bus(next(a for a in asides if clearance(a) > gap))])
+    assert max(gap, 0.55) < driven.clearances.min() < 0.85
+    assert driven.clearances[-1] > 15.0
 
 
 @pytest.mark.parametrize(("radius", "decision"), [(16.0, "nudge left 5"), (6.5, "stop behind 5")])
