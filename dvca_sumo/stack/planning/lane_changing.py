@@ -14,7 +14,7 @@ from dvca_sumo.messages import Floats, TrackedObjects, VehicleShape
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.lane_gaps import LAST_SPEED, Gaps, Neighbours
-from dvca_sumo.stack.planning.path import blend_length
+from dvca_sumo.stack.planning.moves import blend_length
 from dvca_sumo.stack.planning.reference import BEHIND, Window
 from dvca_sumo.stack.planning.speed import Stop
 

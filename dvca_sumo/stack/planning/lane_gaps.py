@@ -14,7 +14,7 @@ from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import Floats, ObjectClass, TrackedObjects, VehicleShape
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.path import blend_length
+from dvca_sumo.stack.planning.moves import blend_length
 from dvca_sumo.stack.planning.reference import Window
 from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags
 

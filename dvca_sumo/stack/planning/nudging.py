@@ -10,7 +10,8 @@ from dvca_sumo.messages import Floats, ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.blockers import LENGTHWISE, PARALLEL, SLOWEST, Blocker, blockers
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
-from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length, feasible_length, roomy_length
+from dvca_sumo.stack.planning.moves import Lateral, Move, blend_length, feasible_length, roomy_length
+from dvca_sumo.stack.planning.path import Plateau
 from dvca_sumo.stack.planning.reference import Window
 from dvca_sumo.stack.planning.room import room_beside
 from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags, Scene
@@ -105,7 +106,8 @@ class NudgeDecider:
             soonest = self._reached(blocker, offset, situation)
             if offset == self._held_offset(blocker.track):
                 return soonest
-            roomy = roomy_length(situation.lateral, offset, 0.0, soonest.begin, situation.window, self._shape)
+            move = Move(situation.lateral, offset, 0.0, soonest.begin)
+            roomy = roomy_length(move, situation.window, self._shape)
             begin = max(soonest.begin, min(roomy, latest))
             plateau = Plateau(begin, max(soonest.end, begin), offset)
             if roomy <= begin <= blocker.high:
@@ -125,7 +127,8 @@ class NudgeDecider:
         if offset == self._held_offset(blocker.track):
             begin = max(begin, self._held[blocker.track].begin - situation.window.station)
         else:
-            begin = feasible_length(situation.lateral, offset, begin, situation.speed, self._config)
+            move = Move(situation.lateral, offset, 0.0, begin)
+            begin = feasible_length(move, situation.speed, situation.window, self._shape, self._config)
         return Plateau(begin, max(end, begin), offset)
 
     def _choices(self, blocker: Blocker, situation: Situation) -> Iterator[float]:

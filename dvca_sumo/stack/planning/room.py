@@ -8,7 +8,7 @@ import numpy as np
 from dvca_sumo.messages import Floats, VehicleShape
 from dvca_sumo.stack.planning.blockers import Blocker
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.path import OVER_LINE, blend_length
+from dvca_sumo.stack.planning.moves import OVER_LINE, blend_length
 from dvca_sumo.stack.planning.reference import Window
 
 

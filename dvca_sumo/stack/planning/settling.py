@@ -1,7 +1,8 @@
 """Moves onto the line of another lane end where they were to end when they began."""
 
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.path import Lateral, Plateau, blend_length
+from dvca_sumo.stack.planning.moves import Lateral, blend_length
+from dvca_sumo.stack.planning.path import Plateau
 
 _LEAP = 0.5  # [m] from one cycle to the next: the line is that of another lane
 
