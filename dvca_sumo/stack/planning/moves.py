@@ -55,7 +55,8 @@ def blend_length(shift: float, speed: float, config: PlanningConfig) -> float:
 def feasible_length(move: Move, speed: float, window: Window, shape: VehicleShape, config: PlanningConfig) -> float:
     """The length of `move` [m], or more where tyres or steering could not follow it.
 
-    In a bend of the line the wheels are turned already: the tighter that is, the less a move may turn them on.
+    In a bend of the line the wheels are turned already: the tighter that is, the less may a move turn them on, and the
+    more back.
     """
     state, target, begin, length = move
     sharpest = min(config.curvature, config.hard_shift_acceleration / max(speed * speed, 0.1))
@@ -68,7 +69,8 @@ def feasible_length(move: Move, speed: float, window: Window, shape: VehicleShap
             bend = _second(terms, u) / squared
             line = float(window.curvatures[_row(window, begin + u * length)])
             turned = max(tightest, abs(state.bend + line), abs(line) + _SLIGHTEST)
-            if abs(bend) > sharpest or abs(bend + line) > turned:
+            unwound = abs(line) if bend * line < 0.0 else 0.0
+            if abs(bend) > sharpest + unwound or abs(bend + line) > turned:
                 break
         else:
             return length

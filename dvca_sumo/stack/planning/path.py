@@ -93,6 +93,18 @@ def path_along(
     return Path(x, y, headings, (line_curvatures + turns) * cosines_to_line / scale, arcs, *sides)
 
 
+def way_back(
+    state: Lateral, begin: float, speed: float, window: Window, shape: VehicleShape, config: PlanningConfig
+) -> Move:
+    """The move back to the line, from station `begin` [m]: in comfort, if tyres, steering and the front allow it."""
+    move = Move(state, 0.0, begin, blend_length(state.unsettled, speed, config))
+    move = move._replace(length=feasible_length(move, speed, window, shape, config))
+    if state.unsettled > _AT_REST:
+        roomy = roomy_length(move, window, shape)
+        return move if roomy == math.inf else move._replace(length=roomy)
+    return move
+
+
 def _profile(moves: list[Move], lateral: Lateral, count: int) -> tuple[Floats, float]:
     """Offset and slope at stations 0 ... count-1 (2, count), by holds and moves between; the bend at station 0."""
     profile, bend = np.zeros((2, count)), 0.0
@@ -127,7 +139,7 @@ def _moves(
     position, state, unsettled = 0.0, lateral, lateral.unsettled
     for plateau in plateaus:
         length = blend_length(max(abs(plateau.offset - state.offset), unsettled), speed, config)
-        back = _back(state, position, speed, window, shape, config)
+        back = way_back(state, position, speed, window, shape, config)
         is_underway = not moves and state.offset * plateau.offset > 0.0
         if plateau.begin - (_UNDERWAY * length if is_underway else length) > position + back.length:
             moves.append(back)
@@ -139,17 +151,5 @@ def _moves(
         moves.append(move)
         position = max(plateau.end, begin + move.length)
         state, unsettled = Lateral(plateau.offset, 0.0, 0.0), 0.0
-    moves.append(_back(state, position, speed, window, shape, config))
+    moves.append(way_back(state, position, speed, window, shape, config))
     return moves
-
-
-def _back(
-    state: Lateral, begin: float, speed: float, window: Window, shape: VehicleShape, config: PlanningConfig
-) -> Move:
-    """The move back to the line."""
-    move = Move(state, 0.0, begin, blend_length(state.unsettled, speed, config))
-    move = move._replace(length=feasible_length(move, speed, window, shape, config))
-    if state.unsettled > _AT_REST:
-        roomy = roomy_length(move, window, shape)
-        return move if roomy == math.inf else move._replace(length=roomy)
-    return move

@@ -55,7 +55,7 @@ class Planner:
         self._lane_changer = LaneChanger(route.lane_changes, gaps, shape, config)
         self._passing = Passing(route.passing_lanes, gaps, shape, config)
         self._nudging = NudgeDecider(shape, config)
-        self._settling = Settling(config)
+        self._settling = Settling(shape, config)
         self._standing = Standing()
         self._meetings = Meetings(route.lane_ids, shape, config)
         self._previous: Trajectory | None = None
@@ -123,7 +123,7 @@ class Planner:
         views = self._junctions.step(time, nose, station - shape.rear_overhang, start.speed, signals, predicted.objects)
         lateral = lateral_start(start, window, offset)
         nudges = self._nudging.step(Situation(time, start.speed, lateral, window, scene, views))
-        settled = self._settling.step(lateral, station, start.speed)
+        settled = self._settling.step(lateral, window, start.speed)
         plateaus = [nudge.plateau for nudge in nudges] or settled
         path = path_along(window, start, lateral, plateaus, shape, config)
         graph = graph_of(scene, window, path, self._route, start.speed, shape, config)

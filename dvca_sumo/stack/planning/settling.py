@@ -1,8 +1,10 @@
 """Moves onto the line of another lane end where they were to end when they began."""
 
+from dvca_sumo.messages import VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.moves import Lateral, blend_length
-from dvca_sumo.stack.planning.path import Plateau
+from dvca_sumo.stack.planning.moves import Lateral
+from dvca_sumo.stack.planning.path import Plateau, way_back
+from dvca_sumo.stack.planning.reference import Window
 
 _LEAP = 0.5  # [m] from one cycle to the next: the line is that of another lane
 
@@ -10,15 +12,17 @@ _LEAP = 0.5  # [m] from one cycle to the next: the line is that of another lane
 class Settling:
     """Remembers where the move ends that is under way. Planned anew to its full length again and again it would not."""
 
-    def __init__(self, config: PlanningConfig) -> None:
+    def __init__(self, shape: VehicleShape, config: PlanningConfig) -> None:
+        self._shape = shape
         self._config = config
         self._offset = 0.0  # [m] of the last cycle
         self._end: float | None = None  # [m] route station
 
-    def step(self, lateral: Lateral, station: float, speed: float) -> list[Plateau]:
-        """Where the ego, `lateral` to the line of this cycle at the route's `station` [m], has to be on it; or none."""
+    def step(self, lateral: Lateral, window: Window, speed: float) -> list[Plateau]:
+        """Where the ego, `lateral` to the line of this cycle at the origin of `window`, has to be on it; or none."""
+        station = window.station
         if abs(lateral.offset - self._offset) > _LEAP:
-            self._end = station + blend_length(lateral.unsettled, speed, self._config)
+            self._end = station + way_back(lateral, 0.0, speed, window, self._shape, self._config).length
         self._offset = lateral.offset
         if self._end is None or self._end <= station:
             self._end = None

@@ -82,6 +82,22 @@ def test_moves_in_a_bend_do_not_turn_the_wheels_farther_than_they_go(radius: flo
     assert abs(sweeps(driven, route)[-1]) < 1.0
 
 
+@pytest.mark.parametrize("speed", [0.0, 3.0])
+@pytest.mark.parametrize("station", [58.0, 64.0])
+@pytest.mark.parametrize("aside", [-3.2, -2.0, 2.0, 3.2])
+@pytest.mark.parametrize("radius", [8.0, 12.0])
+def test_move_onto_another_lane_in_a_bend_ends_on_it_and_does_not_swing_out_beyond(
+    radius: float, aside: float, station: float, speed: float
+) -> None:
+    route = road(curve_points(radius, before=50.0))
+    route = msgspec.structs.replace(route, road_left=route.road_left + 3.2, road_right=route.road_right - 3.2)
+    moves, alone = (drive(route, 12.0, speed=speed, station=station, aside=offset) for offset in (aside, 0.0))
+    side = -math.copysign(1.0, aside)
+    swept, usual = (float((side * sweeps(driven, route)).max()) for driven in (moves, alone))
+    assert swept < max(usual, 1.6) + 0.1
+    assert abs(sweeps(moves, route)[-1]) < 1.0
+
+
 def test_ego_that_points_away_from_the_line_is_led_back_slowly() -> None:
     points = planner().step(believed(50.0, 6.0, 1.5, 5.0), NOBODY, {}).points
     assert points[-1, 4] < PlanningConfig().astray_speed + 0.1
