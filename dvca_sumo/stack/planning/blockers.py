@@ -28,13 +28,22 @@ class Beside(NamedTuple):
     Offsets of the rear axle at which the body, keeping its distance to the line, touches them.
     """
 
+    low: Floats  # [m] stations from ...
+    high: Floats  # [m] ... to
     right: Floats  # [m] passing on their right
     left: Floats  # [m] on their left
+
+    def of(self, which: Flags) -> "Beside":
+        """Some of them."""
+        return Beside(*(column[which] for column in self))
 
     def clearances(self, offset: float) -> Floats:
         """Between body and each object, the ego passing at `offset` [m]; negative where they would overlap."""
         gaps: Floats = np.maximum(self.right - offset, offset - self.left)
         return gaps
+
+
+_NOBODY = Beside(*np.empty((4, 0)))
 
 
 class Blocker(msgspec.Struct, frozen=True, eq=False):
@@ -63,16 +72,16 @@ def blockers(
     held: Collection[int],
     shape: VehicleShape,
     config: PlanningConfig,
-) -> list[Blocker]:
+) -> tuple[list[Blocker], Beside]:
     """Objects that the ego, centred in its lane, would pass with less than the wanted clearance, by station.
 
     They stand, or walk along the road; who starts to move when the ego is beside them, or too near to fall in behind
     them in comfort, is passed all the same, or passes the ego: those are among `held`, the tracks passed in the last
-    cycle. `speed` is the ego's [m/s].
+    cycle. `speed` is the ego's [m/s]. Where there are any: all who stand, too.
     """
     walks = _walks_along(scene)
     if not (walks | scene.is_standing).any() and not held:
-        return []
+        return [], _NOBODY
     now = scene.now
     wanted = np.where(scene.classes == _PERSON, config.person_clearance, config.nudge_clearance)
     is_held = np.array([track in held for track in scene.ids], dtype=np.bool_)
@@ -88,7 +97,7 @@ def blockers(
     near &= now.stations + now.half_lengths > -shape.rear_overhang - LENGTHWISE
     near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
     if not near.any():
-        return []
+        return [], _NOBODY
     beside = _beside(scene, window, near | scene.is_standing)
     near &= beside.clearances(0.0) < limits
     met = _met(now.stations, np.where(walks, scene.speeds * now.directions, 0.0), speed, config.acceleration)
@@ -97,8 +106,8 @@ def blockers(
     found = []
     for row in near.nonzero()[0].tolist():
         low, high = float(lows[row]), float(highs[row])
-        alongside = scene.is_standing & (now.stations + now.half_lengths > low - shape.front - LENGTHWISE)
-        alongside &= now.stations - now.half_lengths < high + shape.rear_overhang + LENGTHWISE
+        alongside = scene.is_standing & (beside.high > low - shape.front - LENGTHWISE)
+        alongside &= beside.low < high + shape.rear_overhang + LENGTHWISE
         alongside[row] = False
         found.append(
             Blocker(
@@ -111,15 +120,17 @@ def blockers(
                 left=float(beside.left[row]),
                 wanted=float(wanted[row]),
                 walks=bool(walks[row]),
-                others=Beside(beside.right[alongside], beside.left[alongside]),
+                others=beside.of(alongside),
             )
         )
-    return sorted(found, key=lambda blocker: blocker.low)
+    return sorted(found, key=lambda blocker: blocker.low), beside.of(scene.is_standing)
 
 
 def _beside(scene: Scene, window: Window, which: Flags) -> Beside:
     """Where those of `which` (n,) are, by their outlines: of an aslant one a corner is nearest, in one place only."""
-    sides = Beside(np.full(len(which), np.inf), np.full(len(which), -np.inf))
+    now = scene.now
+    low, high = now.stations - now.half_lengths, now.stations + now.half_lengths
+    sides = Beside(low, high, np.full(len(which), np.inf), np.full(len(which), -np.inf))
     stations, offsets, _ = window.project(outlines(scene.boxes[which], _PARTS).reshape(-1, 2))
     rows = window.index(stations)
     sides.right[which] = (offsets - window.swept_left.take(rows)).reshape(-1, 4 * _PARTS).min(axis=1)

@@ -17,6 +17,10 @@ _SHORTEST_REST = 1.0  # [m] of a move that is nearly done
 _STRETCH = 1.1
 _LONGEST = 20.0  # [m] of a move: on more, the front hardly swings out
 _TOLERANCE = 1.1  # of curvature, so that a move found feasible is found so again from every point on it
+# The slope where a move begins, times its length, by what is left to the target: up to 2.5 it does not pass that, and
+# what is left of such a move does not come to more than this.
+_SWINGING = 4.0
+_UNNOTICED = 1.0  # [m] of slope times length carry it 0.16 m past
 _SLIGHTEST = 0.02  # [1/m] that a move may bend into a bend of the line, however tight that is
 _SAMPLES = (0.15, 0.3, 0.5, 0.7, 0.85)
 
@@ -53,15 +57,17 @@ def blend_length(shift: float, speed: float, config: PlanningConfig) -> float:
 
 
 def feasible_length(move: Move, speed: float, window: Window, shape: VehicleShape, config: PlanningConfig) -> float:
-    """The length of `move` [m], or more where tyres or steering could not follow it.
+    """The length of `move` [m], less where it would swing past its target, more where tyres or steering cannot follow.
 
-    In a bend of the line the wheels are turned already: the tighter that is, the less may a move turn them on, and the
-    more back.
+    In a bend of the line the wheels are turned already: the tighter it is, the less they turn on, and the more back.
     """
     state, target, begin, length = move
     sharpest = min(config.curvature, config.hard_shift_acceleration / max(speed * speed, 0.1))
     sharpest = max(_TOLERANCE * sharpest, abs(state.bend))
     tightest = _TOLERANCE * math.tan(config.steering) / shape.wheelbase
+    gap = target - state.offset
+    if state.slope * gap > 0.0:
+        length = min(length, max(_SWINGING * abs(gap), _UNNOTICED) / abs(state.slope))
     length = max(length, _SHORTEST_REST)
     while True:
         terms, squared = _terms(state, target, length), length * length

@@ -10,6 +10,7 @@ from dvca_sumo.messages import Floats, ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.blockers import LENGTHWISE, PARALLEL, SLOWEST, Blocker, blockers
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
+from dvca_sumo.stack.planning.keeping import kept
 from dvca_sumo.stack.planning.moves import Lateral, Move, blend_length, feasible_length, roomy_length
 from dvca_sumo.stack.planning.path import Plateau
 from dvca_sumo.stack.planning.reference import Window
@@ -64,8 +65,11 @@ class NudgeDecider:
         """The tracks that stood in the last cycle."""
         return self._since
 
-    def step(self, situation: Situation) -> list[Nudge]:
-        """The nudges of this cycle by station; objects without one are passed by staying in lane, or stopped for."""
+    def step(self, situation: Situation) -> tuple[list[Nudge], list[Plateau]]:
+        """The nudges of this cycle by station, and where the ego has to be to go by all who stand beside its way.
+
+        Objects without a nudge are passed by staying in lane, or stopped for.
+        """
         scene, station = situation.scene, situation.window.station
         standing = [scene.ids[row] for row in scene.is_standing.nonzero()[0].tolist()]
         moving = [scene.ids[row] for row in (~scene.is_standing).nonzero()[0].tolist()]
@@ -74,7 +78,8 @@ class NudgeDecider:
         self._driven &= set(scene.ids)
         self._driven.update(track for track, since in self._moving.items() if situation.time - since > _DRIVING)
         nudges = []
-        for blocker in blockers(scene, situation.window, situation.speed, self._held, self._shape, self._config):
+        found, beside = blockers(scene, situation.window, situation.speed, self._held, self._shape, self._config)
+        for blocker in found:
             plateau = self._plateau(blocker, situation)
             if plateau is not None:
                 nudges.append(Nudge(blocker.track, plateau))
@@ -83,7 +88,8 @@ class NudgeDecider:
             for nudge in nudges
             for begin, end, offset in (nudge.plateau,)
         }
-        return nudges
+        plateaus = sorted(nudge.plateau for nudge in nudges)
+        return nudges, kept(plateaus, situation.lateral, beside, self._shape, self._config)
 
     def _plateau(self, blocker: Blocker, situation: Situation) -> Plateau | None:
         """Where and how far to move aside; None where there is no way round, or where none is needed.

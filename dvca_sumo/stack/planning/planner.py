@@ -122,9 +122,8 @@ class Planner:
         nose = station if config.lines_at_rear_axle else station + shape.front
         views = self._junctions.step(time, nose, station - shape.rear_overhang, start.speed, signals, predicted.objects)
         lateral = lateral_start(start, window, offset)
-        nudges = self._nudging.step(Situation(time, start.speed, lateral, window, scene, views))
-        settled = self._settling.step(lateral, window, start.speed)
-        plateaus = [nudge.plateau for nudge in nudges] or settled
+        nudges, plateaus = self._nudging.step(Situation(time, start.speed, lateral, window, scene, views))
+        plateaus = self._settling.step(lateral, window, start.speed, plateaus)
         path = path_along(window, start, lateral, plateaus, shape, config)
         graph = graph_of(scene, window, path, self._route, start.speed, shape, config)
         profile = self._profile(start, graph, views, choice)

@@ -18,13 +18,21 @@ class Settling:
         self._offset = 0.0  # [m] of the last cycle
         self._end: float | None = None  # [m] route station
 
-    def step(self, lateral: Lateral, window: Window, speed: float) -> list[Plateau]:
-        """Where the ego, `lateral` to the line of this cycle at the origin of `window`, has to be on it; or none."""
+    def step(self, lateral: Lateral, window: Window, speed: float, plateaus: list[Plateau]) -> list[Plateau]:
+        """The `plateaus` of a cycle, and before them where the ego has to be on the line.
+
+        It is `lateral` to the line of this cycle, at the origin of `window`. Whom it has to get round before, it gets
+        round first.
+        """
         station = window.station
         if abs(lateral.offset - self._offset) > _LEAP:
             self._end = station + way_back(lateral, 0.0, speed, window, self._shape, self._config).length
         self._offset = lateral.offset
         if self._end is None or self._end <= station:
             self._end = None
-            return []
-        return [Plateau(self._end - station, self._end - station, 0.0)]
+            return plateaus
+        ahead = self._end - station
+        if plateaus and plateaus[0].begin < ahead:
+            self._offset, self._end = 0.0, None  # the move begins anew after them
+            return plateaus
+        return [Plateau(ahead, ahead, 0.0), *plateaus]

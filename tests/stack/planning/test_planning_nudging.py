@@ -282,6 +282,20 @@ def test_gap_between_two_objects_that_is_too_narrow_is_stopped_for() -> None:
     assert driven.clearances.min() > 2.0
 
 
+@pytest.mark.parametrize("speed", [0.0, 5.0, 9.0])
+@pytest.mark.parametrize(("ahead", "passes"), [(12.0, False), (15.0, True)])
+def test_way_round_one_keeps_clear_of_who_stands_beside_the_way_there(
+    ahead: float, speed: float, *, passes: bool
+) -> None:
+    beside, in_way = car(1, 42.0, 3.15, size=(8.0, 1.8)), car(2, 42.0 + ahead, -1.2)
+    driven = drive(road(lanes_left=1), 40.0, speed=speed, station=20.0, actors=[beside, in_way])
+    assert driven.clearances.min() > 0.4
+    assert driven.states[:, 5].min() > -4.0
+    assert (driven.fronts[-1] > 200.0) == passes
+    assert (driven.decisions[-1] == "stop behind 2") != passes
+    assert_drivable(driven)
+
+
 def test_object_on_the_left_is_passed_on_the_right() -> None:
     route = road()
     wide = msgspec.structs.replace(route, road_right=route.road_right - 3.2)

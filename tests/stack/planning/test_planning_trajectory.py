@@ -5,7 +5,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import SHAPE, believed, car, curve_points, drive, predicted, road, sweeps
+from planned_drives import SHAPE, believed, car, curve_points, drive, person, predicted, road, sweeps
 
 from dvca_sumo.messages import TRAJECTORY_TIMES, Trajectory
 from dvca_sumo.stack.planning import Planner, PlanningConfig
@@ -96,6 +96,41 @@ def test_move_onto_another_lane_in_a_bend_ends_on_it_and_does_not_swing_out_beyo
     swept, usual = (float((side * sweeps(driven, route)).max()) for driven in (moves, alone))
     assert swept < max(usual, 1.6) + 0.1
     assert abs(sweeps(moves, route)[-1]) < 1.0
+
+
+@pytest.mark.parametrize("station", [50.0, 56.0])
+def test_move_onto_another_lane_that_a_person_interrupts_begins_anew_behind_them(station: float) -> None:
+    route = road(curve_points(12.0, before=40.0))
+    route = msgspec.structs.replace(route, road_right=route.road_right - 3.2, start=40.0)
+    x, y, heading = route.line.poses(np.array([station + 4.0]))[0].tolist()
+    someone = person(1, x + 1.4 * math.sin(heading), y - 1.4 * math.cos(heading))
+    driven = drive(route, 30.0, speed=5.0, station=station - 8.0, aside=-3.2, actors=[someone])
+    assert sweeps(driven, route).max() < 1.6
+    assert driven.clearances.min() > 0.3
+    assert driven.states[-1, 2] > 100.0
+
+
+@pytest.mark.parametrize("farther", [43.0, 50.0])
+def test_move_onto_another_lane_is_over_before_room_is_made_for_who_is_far_ahead(farther: float) -> None:
+    route = road(curve_points(25.0, before=20.0))
+    route = msgspec.structs.replace(
+        route, road_left=route.road_left + 3.2, road_right=route.road_right - 3.2, start=20.0
+    )
+    x, y, heading = route.line.poses(np.array([24.0 + farther]))[0].tolist()
+    someone = person(1, x + 2.2 * math.sin(heading), y - 2.2 * math.cos(heading))
+    driven = drive(route, 14.0, station=24.0, aside=-3.2, actors=[someone])
+    assert sweeps(driven, route).max() < 1.6
+    assert driven.states[-1, 2] > 80.0
+
+
+@pytest.mark.parametrize("far", [12.0, 24.0, 48.0])
+def test_move_that_is_on_its_way_to_the_target_does_not_swing_far_past_it(far: float) -> None:
+    window = Reference(road(), SHAPE, PlanningConfig()).window(100.0, 120.0)
+    start = StartState(100.0, 2.2, -0.4, 4.0, 0.0, 0.0)
+    lateral = Lateral(2.2, math.tan(-0.4), 0.0)
+    path = path_along(window, start, lateral, [Plateau(far, far + 8.0, 0.2)], SHAPE, PlanningConfig())
+    assert path.y.min() > -0.15
+    assert path.y[int(far) + 1 : int(far) + 8] == pytest.approx(0.2, abs=0.01)
 
 
 def test_ego_that_points_away_from_the_line_is_led_back_slowly() -> None:
