@@ -2,7 +2,7 @@
 
 from dvca_sumo.messages import VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.moves import Lateral
+from dvca_sumo.stack.planning.moves import Lateral, blend_length
 from dvca_sumo.stack.planning.path import Plateau, way_back
 from dvca_sumo.stack.planning.reference import Window
 
@@ -21,8 +21,8 @@ class Settling:
     def step(self, lateral: Lateral, window: Window, speed: float, plateaus: list[Plateau]) -> list[Plateau]:
         """The `plateaus` of a cycle, and before them where the ego has to be on the line.
 
-        It is `lateral` to the line of this cycle, at the origin of `window`. Whom it has to get round before, it gets
-        round first.
+        It is `lateral` to the line of this cycle, at the origin of `window`. Whom it has to get round before, or right
+        behind that, it gets round first.
         """
         station = window.station
         if abs(lateral.offset - self._offset) > _LEAP:
@@ -32,7 +32,7 @@ class Settling:
             self._end = None
             return plateaus
         ahead = self._end - station
-        if plateaus and plateaus[0].begin < ahead:
+        if plateaus and plateaus[0].begin - blend_length(plateaus[0].offset, speed, self._config) < ahead:
             self._offset, self._end = 0.0, None  # the move begins anew after them
             return plateaus
         return [Plateau(ahead, ahead, 0.0), *plateaus]

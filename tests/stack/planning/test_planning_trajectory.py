@@ -123,6 +123,16 @@ def test_move_onto_another_lane_is_over_before_room_is_made_for_who_is_far_ahead
     assert driven.states[-1, 2] > 80.0
 
 
+@pytest.mark.parametrize("x", [38.0, 39.0, 40.0])
+def test_move_onto_another_lane_goes_on_round_who_stands_right_behind_its_end(x: float) -> None:
+    route = road(lanes_left=1)
+    route = msgspec.structs.replace(route, road_right=route.road_right - 3.2)
+    driven = drive(route, 20.0, station=20.0, aside=3.2, actors=[car(1, x, 2.4, heading=0.3)])
+    assert driven.clearances.min() > 0.4
+    assert driven.states[:, 5].min() > -3.0
+    assert driven.states[-1, 1] > 100.0
+
+
 @pytest.mark.parametrize("far", [12.0, 24.0, 48.0])
 def test_move_that_is_on_its_way_to_the_target_does_not_swing_far_past_it(far: float) -> None:
     window = Reference(road(), SHAPE, PlanningConfig()).window(100.0, 120.0)
