@@ -21,7 +21,6 @@ _TOLERANCE = 1.1  # of curvature, so that a move found feasible is found so agai
 # what is left of such a move does not come to more than this.
 _SWINGING = 4.0
 _UNNOTICED = 1.0  # [m] of slope times length carry it 0.16 m past
-_SLIGHTEST = 0.02  # [1/m] that a move may bend into a bend of the line, however tight that is
 _SAMPLES = (0.15, 0.3, 0.5, 0.7, 0.85)
 
 _Terms = tuple[float, float, float, float, float]
@@ -56,15 +55,14 @@ def blend_length(shift: float, speed: float, config: PlanningConfig) -> float:
     return max(_SHORTEST_BLEND, math.sqrt(_PEAK * abs(shift) / sharpest))
 
 
-def feasible_length(move: Move, speed: float, window: Window, shape: VehicleShape, config: PlanningConfig) -> float:
+def feasible_length(move: Move, speed: float, window: Window, config: PlanningConfig) -> float:
     """The length of `move` [m], less where it would swing past its target, more where tyres or steering cannot follow.
 
-    In a bend of the line the wheels are turned already: the tighter it is, the less they turn on, and the more back.
+    Against a bend of the line the wheels only turn back: there it may be as much sharper as the line bends.
     """
     state, target, begin, length = move
     sharpest = min(config.curvature, config.hard_shift_acceleration / max(speed * speed, 0.1))
     sharpest = max(_TOLERANCE * sharpest, abs(state.bend))
-    tightest = _TOLERANCE * math.tan(config.steering) / shape.wheelbase
     gap = target - state.offset
     if state.slope * gap > 0.0:
         length = min(length, max(_SWINGING * abs(gap), _UNNOTICED) / abs(state.slope))
@@ -74,9 +72,7 @@ def feasible_length(move: Move, speed: float, window: Window, shape: VehicleShap
         for u in _SAMPLES:
             bend = _second(terms, u) / squared
             line = float(window.curvatures[_row(window, begin + u * length)])
-            turned = max(tightest, abs(state.bend + line), abs(line) + _SLIGHTEST)
-            unwound = abs(line) if bend * line < 0.0 else 0.0
-            if abs(bend) > sharpest + unwound or abs(bend + line) > turned:
+            if abs(bend) > sharpest + (abs(line) if bend * line < 0.0 else 0.0):
                 break
         else:
             return length

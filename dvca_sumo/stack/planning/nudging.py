@@ -134,7 +134,7 @@ class NudgeDecider:
             begin = max(begin, self._held[blocker.track].begin - situation.window.station)
         else:
             move = Move(situation.lateral, offset, 0.0, begin)
-            begin = feasible_length(move, situation.speed, situation.window, self._shape, self._config)
+            begin = feasible_length(move, situation.speed, situation.window, self._config)
         return Plateau(begin, max(end, begin), offset)
 
     def _choices(self, blocker: Blocker, situation: Situation) -> Iterator[float]:

@@ -98,7 +98,7 @@ def way_back(
 ) -> Move:
     """The move back to the line, from station `begin` [m]: in comfort, if tyres, steering and the front allow it."""
     move = Move(state, 0.0, begin, blend_length(state.unsettled, speed, config))
-    move = move._replace(length=feasible_length(move, speed, window, shape, config))
+    move = move._replace(length=feasible_length(move, speed, window, config))
     if state.unsettled > _AT_REST:
         roomy = roomy_length(move, window, shape)
         return move if roomy == math.inf else move._replace(length=roomy)
@@ -147,7 +147,7 @@ def _moves(
             length = blend_length(plateau.offset, speed, config)
         begin = max(position, plateau.begin - length) if moves else position
         move = Move(state, plateau.offset, begin, plateau.begin - begin)
-        move = move._replace(length=feasible_length(move, speed, window, shape, config))
+        move = move._replace(length=feasible_length(move, speed, window, config))
         moves.append(move)
         position = max(plateau.end, begin + move.length)
         state, unsettled = Lateral(plateau.offset, 0.0, 0.0), 0.0
