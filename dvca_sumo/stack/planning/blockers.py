@@ -75,9 +75,11 @@ def blockers(
 ) -> tuple[list[Blocker], Beside]:
     """Objects that the ego, centred in its lane, would pass with less than the wanted clearance, by station.
 
+    With them all who stand, beside the way to them and back too; nobody where there are none.
+
     They stand, or walk along the road; who starts to move when the ego is beside them, or too near to fall in behind
     them in comfort, is passed all the same, or passes the ego: those are among `held`, the tracks passed in the last
-    cycle. `speed` is the ego's [m/s]. Where there are any: all who stand, too.
+    cycle. `speed` is the ego's [m/s].
     """
     walks = _walks_along(scene)
     if not (walks | scene.is_standing).any() and not held:
@@ -106,9 +108,6 @@ def blockers(
     found = []
     for row in near.nonzero()[0].tolist():
         low, high = float(lows[row]), float(highs[row])
-        alongside = scene.is_standing & (beside.high > low - shape.front - LENGTHWISE)
-        alongside &= beside.low < high + shape.rear_overhang + LENGTHWISE
-        alongside[row] = False
         found.append(
             Blocker(
                 track=scene.ids[row],
@@ -120,10 +119,18 @@ def blockers(
                 left=float(beside.left[row]),
                 wanted=float(wanted[row]),
                 walks=bool(walks[row]),
-                others=beside.of(alongside),
+                others=beside.of(_standing_alongside(row, low, high, scene, beside, shape)),
             )
         )
     return sorted(found, key=lambda blocker: blocker.low), beside.of(scene.is_standing)
+
+
+def _standing_alongside(row: int, low: float, high: float, scene: Scene, beside: Beside, shape: VehicleShape) -> Flags:
+    """Which others (n,) stand where the ego is while it passes this `row`, from station `low` to `high` [m]."""
+    alongside: Flags = scene.is_standing & (beside.high > low - shape.front - LENGTHWISE)
+    alongside &= beside.low < high + shape.rear_overhang + LENGTHWISE
+    alongside[row] = False
+    return alongside
 
 
 def _beside(scene: Scene, window: Window, which: Flags) -> Beside:

@@ -36,7 +36,12 @@ def curve_points(radius: float, before: float = 100.0, after: float = 150.0) -> 
     turning = math.pi / 2.0 * radius
     stations = np.arange(0.0, before + turning + 10.0 + after + 0.5)
     curvature = np.interp(stations, [before, before + 10.0, before + turning, before + turning + 10.0], [0, 1, 1, 0])
-    headings = np.concatenate(([0.0], np.cumsum(0.5 * (curvature[1:] + curvature[:-1]) / radius)))
+    return bent_points(curvature / radius)
+
+
+def bent_points(curvatures: Floats) -> Floats:
+    """A line from the origin along x, 1 m between points, as curved [1/m] at each."""
+    headings = np.concatenate(([0.0], np.cumsum(0.5 * (curvatures[1:] + curvatures[:-1]))))
     middle = 0.5 * (headings[1:] + headings[:-1])
     return np.column_stack([np.cumsum(np.append(0.0, np.cos(middle))), np.cumsum(np.append(0.0, np.sin(middle)))])
 

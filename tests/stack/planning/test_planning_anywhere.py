@@ -5,7 +5,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import SHAPE, Actor, car, cone, drive, person, road, sweeps
+from planned_drives import SHAPE, Actor, bent_points, car, cone, drive, person, road, sweeps
 
 from dvca_sumo.messages import Floats
 from dvca_sumo.roadmap.route import Route
@@ -26,9 +26,7 @@ def drawn_points(draws: np.random.Generator) -> Floats:
         )
         curvatures[begin : begin + len(bend)] = side * bend / radius
         begin += len(bend) + int(draws.integers(2, 25))
-    headings = np.concatenate(([0.0], np.cumsum(0.5 * (curvatures[1:] + curvatures[:-1]))))
-    middle = 0.5 * (headings[1:] + headings[:-1])
-    return np.column_stack([np.cumsum(np.append(0.0, np.cos(middle))), np.cumsum(np.append(0.0, np.sin(middle)))])
+    return bent_points(curvatures)
 
 
 def drawn_route(draws: np.random.Generator) -> tuple[Route, int, int]:
@@ -48,9 +46,9 @@ def drawn_actors(draws: np.random.Generator, route: Route) -> list[Actor]:
     """Up to three who stand in the lane or beside it, some aslant, none of them just before the ego."""
     actors = []
     for track in range(draws.integers(0, 4)):
-        x, y, along = route.line.poses(np.array([draws.uniform(40.0, 100.0)]))[0].tolist()
-        aside, heading = draws.uniform(1.2, 3.6) * draws.choice([-1, 1]), along + draws.choice([0.0, 0.0, 0.3, -0.3])
-        x, y = x - aside * math.sin(along), y + aside * math.cos(along)
+        station, aside = draws.uniform(40.0, 100.0), draws.uniform(1.2, 3.6) * draws.choice([-1, 1])
+        x, y, along = route.line.poses(np.array([station]), np.array([aside]))[0].tolist()
+        heading = along + draws.choice([0.0, 0.0, 0.3, -0.3])
         size = (float(draws.choice([4.5, 8.0])), 1.8)
         kinds = (person(track, x, y), cone(track, x, y), car(track, x, y, heading=heading, size=size))
         actors.append(kinds[draws.integers(0, 3)])
