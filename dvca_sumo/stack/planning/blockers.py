@@ -100,8 +100,10 @@ def blockers(
     near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
     if not near.any():
         return [], _NOBODY
+    near &= _beside(scene, window, near).clearances(0.0) < limits
+    if not near.any():
+        return [], _NOBODY
     beside = _beside(scene, window, near | scene.is_standing)
-    near &= beside.clearances(0.0) < limits
     met = _met(now.stations, np.where(walks, scene.speeds * now.directions, 0.0), speed, config.acceleration)
     lows = np.minimum(now.stations, met) - now.half_lengths
     highs = met + now.half_lengths
