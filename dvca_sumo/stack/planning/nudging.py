@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Container, Iterator
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -23,6 +24,7 @@ _UNSURE = 0.08  # [m] less room than wanted at least does not end a nudge: noise
 _DRIVING = 1.0  # [s] of moving: what is seen first may seem to move for less
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane
 _CLOSING = 2.0  # [s] of closing speed kept to those who come from behind
+_SURE = 1.0  # [s] for which nobody has come alongside who did before, until the ego leaves its lane
 
 
 class Nudge(msgspec.Struct, frozen=True):
@@ -37,6 +39,13 @@ class Nudge(msgspec.Struct, frozen=True):
         return f"nudge {'left' if self.plateau.offset > 0.0 else 'right'} {self.track}"
 
 
+class Taken(NamedTuple):
+    """Somebody comes alongside."""
+
+    offset: float  # [m] from the line, of an ego as near to it as that, or farther off
+    time: float  # [s] when that was last found
+
+
 class Situation(msgspec.Struct, frozen=True, eq=False):
     """What the path decision of one cycle looks at."""
 
@@ -46,6 +55,9 @@ class Situation(msgspec.Struct, frozen=True, eq=False):
     window: Window
     scene: Scene
     views: list[LineView]
+
+
+_NEVER = Taken(math.inf, -math.inf)
 
 
 class NudgeDecider:
@@ -59,6 +71,7 @@ class NudgeDecider:
         self._moving: dict[int, float] = {}  # by track: when it came to move
         self._driven: set[int] = set()  # tracks that were seen driving
         self._held: dict[int, Plateau] = {}  # by track: the last cycle's, in route stations
+        self._taken: dict[tuple[int, bool], Taken] = {}  # by track, and whether on its left
 
     @property
     def stood(self) -> Container[int]:
@@ -75,6 +88,7 @@ class NudgeDecider:
         moving = [scene.ids[row] for row in (~scene.is_standing).nonzero()[0].tolist()]
         self._since = {track: self._since.get(track, situation.time) for track in standing}
         self._moving = {track: self._moving.get(track, situation.time) for track in moving}
+        self._taken = {key: taken for key, taken in self._taken.items() if key[0] in scene.ids}
         self._driven &= set(scene.ids)
         self._driven.update(track for track, since in self._moving.items() if situation.time - since > _DRIVING)
         nudges = []
@@ -200,7 +214,7 @@ class NudgeDecider:
             and (blocker.track not in self._since or situation.lateral.offset / offset > _COMMITTED)
         ):
             return True
-        return self._will_stay(blocker, situation) and self._is_free(blocker, offset, situation)
+        return self._will_stay(blocker, situation) and self._has_been_free(blocker, offset, situation)
 
     def _will_stay(self, blocker: Blocker, situation: Situation) -> bool:
         """Whether it has stood for so long, where it is, that it will not move by itself."""
@@ -267,6 +281,15 @@ class NudgeDecider:
             if view.line.station - view.line.exit_station < to_line < self._config.queue_reach:
                 return True
         return False
+
+    def _has_been_free(self, blocker: Blocker, offset: float, situation: Situation) -> bool:
+        """As `_is_free`, and for a while, if it was not before: predictions that change do not move the ego about."""
+        key, distance, time = (blocker.track, offset > 0.0), abs(offset), situation.time
+        taken = self._taken.get(key, _NEVER)
+        if not self._is_free(blocker, offset, situation):
+            self._taken[key] = Taken(min(distance, taken.offset) if time - taken.time < _SURE else distance, time)
+            return False
+        return time - taken.time >= _SURE or distance < taken.offset
 
     def _is_free(self, blocker: Blocker, offset: float, situation: Situation) -> bool:
         """Whether nobody who moves comes alongside while the ego is out of its lane; who is right behind it follows."""

@@ -188,6 +188,21 @@ def test_who_comes_by_close_to_the_lane_is_left_as_much_room_as_who_stands_at_it
     assert driven.clearances.min() > 0.35
 
 
+def test_ego_does_not_begin_to_pull_out_while_now_and_then_somebody_seems_to_come_alongside() -> None:
+    class Indistinct(Actor, frozen=True):
+        """Stays, but up to `stays_from` looks, half of the time, as if it came."""
+
+        def speed_at(self, time: float) -> float:
+            return 8.0 if time < self.stays_from and math.sin(9.0 * time) > 0.0 else 0.0
+
+    seen = Indistinct(7, ObjectClass.VEHICLE, 150.0, 3.2, heading=math.pi, stays_from=12.0)
+    driven = drive(road(lanes_left=1), 30.0, speed=8.0, station=60.0, actors=[cone(5, 110.0), seen])
+    up_to_then = driven.states[:, 0] < 12.0
+    assert np.abs(driven.states[up_to_then, 2]).max() < 0.05
+    assert driven.fronts[-1] > 120.0
+    assert_drivable(driven)
+
+
 def test_where_the_next_lane_is_busy_the_ego_passes_closer_and_keeps_off_it() -> None:
     busy = [car(10 + i, 200.0 + 12.0 * i, 3.3, heading=math.pi, speed=8.0) for i in range(40)]
     driven = drive(road(lanes_left=1), 30.0, speed=8.0, actors=[person(5, 117.0, -0.6), *busy])
