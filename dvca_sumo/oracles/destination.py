@@ -17,6 +17,7 @@ class Destination:
 
     kind = "destination"
     overrun = "destination_overrun"
+    not_reached = "destination_not_reached"
 
     def __init__(self, places: Places, thresholds: Thresholds) -> None:
         self._findings = Findings(self.kind, Category.MISSION, places)
@@ -48,7 +49,7 @@ class Destination:
         if self._last is None or ended is Ending.CUT:
             return self._findings.judgement("the run was cut before the ego could arrive")
         short = self._places.route.destination - self._places.at(self._last).station
-        self._find(self._last, "destination_not_reached", short, f"{short:.1f} m short of the destination")
+        self._find(self._last, self.not_reached, short, f"{short:.1f} m short of the destination")
         return self._findings.judgement()
 
     def _find(self, moment: Moment, kind: str, value: float, detail: str) -> None:

@@ -15,6 +15,7 @@ from dvca_sumo.run import Departing, opened
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.screen.driving import Driven, Heard
 from dvca_sumo.screen.neighbours import Neighbourhood
+from dvca_sumo.screen.queues import Queues
 from dvca_sumo.screen.results import TripOutcome, TripResult, Watch
 from dvca_sumo.screen.trips import Trip
 from dvca_sumo.stack.reference import reference_stack
@@ -74,7 +75,7 @@ class _Ride:
         judging = departing.judging(entry, route)
         self.native: Native = world.watch(entry, route)
         self._oracles = [oracle for oracle in judging.oracles if oracle.kind != Destination.kind]
-        self._watch = Watch(entry.ego, judging)
+        self._watch = Watch(entry.ego, judging, Queues(world.is_stopping))
         self._latest = entry.time + _PATIENCE
         self._is_judged = True
 

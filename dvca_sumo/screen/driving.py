@@ -9,6 +9,7 @@ from dvca_sumo.engine.replay import roadmap
 from dvca_sumo.run import Departing, Drive, Over, Simulation, Task, built_here, opened
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.screen.neighbours import Neighbourhood, Neighbours
+from dvca_sumo.screen.queues import Queues
 from dvca_sumo.screen.results import TripOutcome, TripResult, Watch
 from dvca_sumo.screen.trips import SLOWER, Trip
 from dvca_sumo.stack.reference import StackError
@@ -72,6 +73,7 @@ class _Fleet:
         self._results: list[TripResult] = []
         self._crowded_out: list[str] = []
         self._neighbourhood = Neighbourhood()
+        self._queues = Queues(world.is_stopping)
 
     def proceed(self, hear: Heard) -> Driven:
         while self._awaited or self._simulation.drives:
@@ -103,7 +105,7 @@ class _Fleet:
                 self._results.append(TripResult(name, TripOutcome.NOT_DRIVEN, str(error)))
                 continue
             self._simulation.drives.append(drive)
-            self._watches[name] = Watch(name, drive.judging)
+            self._watches[name] = Watch(name, drive.judging, self._queues)
 
     def _give_up(self) -> None:
         """On those that will not depart any more."""

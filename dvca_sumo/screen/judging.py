@@ -5,7 +5,8 @@
    the ego was on its way out of the other one's lane; it touched the flank of an ego that was in its lane and not on a
    junction. Then time to collision and distance to that same object just before are its doing, too. And a destination
    is not reached for the others' sake when SUMO's own driver on the same trip had not arrived after the same time
-   either, or when it ends in a jam: see `jams`.
+   either, when it ends in a jam (see `jams`), or when the ego, the time in queues apart that no ego heads (see
+   `queues`), was not too slow compared with that driver.
 3. Everything else is the driver's: the ego's own. Traffic rules are always the driver's.
 
 The ego, or its rear, is in its lane when no corner is more than 0.3 m beyond the edges of the lane under its middle.

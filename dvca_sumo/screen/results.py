@@ -9,6 +9,7 @@ from dvca_sumo.screen.disturbances import Disturbances
 from dvca_sumo.screen.jams import Jams
 from dvca_sumo.screen.judging import Judged, judged
 from dvca_sumo.screen.measures import Measures
+from dvca_sumo.screen.queues import Held, Queues
 from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Judgement
 
@@ -32,6 +33,7 @@ class TripResult(msgspec.Struct, frozen=True):
     start: float = 0.0  # [s] of its departure
     distance: float = 0.0  # [m]
     duration: float = 0.0  # [s]
+    held: float = 0.0  # [s] thereof in queues
     hard_brakings: int = 0
     least_ttc: float | None = None  # [s]; None: none below the horizon
     violations: tuple[Judged, ...] = ()
@@ -42,12 +44,13 @@ class TripResult(msgspec.Struct, frozen=True):
 class Watch:
     """Measures and disturbances of one drive; `result` sums them up."""
 
-    def __init__(self, ego: str, judging: Judging) -> None:
+    def __init__(self, ego: str, judging: Judging, queues: Queues) -> None:
         self._ego = ego
         self._roadmap = judging.places.roadmap
         self._measures = Measures(judging.places, judging.thresholds)
         self._disturbances = Disturbances(judging.places)
         self._jams = Jams(judging.places)
+        self._held = Held(ego, judging.places, queues)
         self._contact: Moment | None = None
 
     def see(self, moment: Moment) -> None:
@@ -55,6 +58,7 @@ class Watch:
         self._measures.see(moment)
         self._disturbances.see(moment)
         self._jams.see(moment)
+        self._held.see(moment)
 
     def holding(self) -> list[str]:
         """Those who hold up the ego now in a jam, if they make no stops of their own."""
@@ -83,6 +87,7 @@ class Watch:
             start=round(last.time - measures.duration, 3),
             distance=measures.distance,
             duration=round(measures.duration, 3),
+            held=round(self._held.duration, 3),
             hard_brakings=measures.hard_brakings,
             least_ttc=measures.least_ttc,
             violations=judged(judgements, self._disturbances, self._contact or last, self._roadmap, jam),

@@ -9,6 +9,7 @@ import msgspec
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.engine.replay import raised, roadmap
 from dvca_sumo.oracles.destination import Destination
+from dvca_sumo.oracles.no_progress import NoProgress
 from dvca_sumo.report.result import versions
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.screen.anchor import anchored
@@ -16,7 +17,7 @@ from dvca_sumo.screen.driving import Driven, Heard, driven, planned
 from dvca_sumo.screen.judging import Fault, Judged
 from dvca_sumo.screen.neighbours import Neighbours, together
 from dvca_sumo.screen.results import TripOutcome, TripResult
-from dvca_sumo.screen.trips import Draw, Trip, drawn
+from dvca_sumo.screen.trips import SLOWER, Draw, Trip, drawn
 from dvca_sumo.stack.sources import StackSource, stack_factory
 from dvca_sumo.store import Store, key_of
 
@@ -208,15 +209,36 @@ def _key(setting: Setting, *question: object) -> str:
 
 
 def excused(result: TripResult, native: TripResult) -> TripResult:
-    """The result, its destination excused where SUMO's driver was held up as long."""
-    if result.outcome is not TripOutcome.TIME_OVER or native.duration <= result.duration:
+    """The result, being late excused where SUMO's driver was held up as long, or the ego by queues."""
+    if result.outcome is not TripOutcome.TIME_OVER:
         return result
-    reason = f"SUMO's driver had not arrived after {result.duration:.0f} s either"
+    if native.duration > result.duration:
+        reason = f"SUMO's driver had not arrived after {result.duration:.0f} s either"
+    elif _is_late_by_queues(result, native):
+        reason = f"held up for {result.held:.0f} s in queues, SUMO's driver for {native.held:.0f} s"
+    else:
+        return result
     violations = tuple(
-        msgspec.structs.replace(one, fault=Fault.OTHER, reason=reason) if one.oracle == Destination.kind else one
+        msgspec.structs.replace(one, fault=Fault.OTHER, reason=reason)
+        if one.violation.kind == Destination.not_reached
+        else one
         for one in result.violations
     )
     return msgspec.structs.replace(result, violations=violations)
+
+
+def _is_late_by_queues(result: TripResult, native: TripResult) -> bool:
+    """Whether, all queues apart, the ego was no slower than it may be compared with SUMO's driver.
+
+    For the rest of its way it is taken to need as long as that one did, on average. Not where it stood for no reason.
+    """
+    if native.outcome is not TripOutcome.ARRIVED or result.held <= native.held:
+        return False
+    if any(one.oracle == NoProgress.kind for one in result.violations):
+        return False
+    moving = native.duration - native.held
+    rest = max(1.0 - result.distance / native.distance, 0.0) * moving
+    return result.duration - result.held + rest <= SLOWER * moving
 
 
 def _marked(result: TripResult, alone: TripResult | None) -> TripResult:

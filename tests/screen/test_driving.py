@@ -117,6 +117,52 @@ def test_an_ego_held_up_in_a_jam_is_not_at_fault(
     assert ("other" in result.violations[0].reason) == (fault is Fault.OTHER)
     assert found.neighbours.stood == (fault is Fault.OTHER)
     assert found.neighbours.hours == pytest.approx(result.duration / 3600.0, abs=0.005)
+    assert (result.held > 60.0) == (fault is Fault.OTHER)
+
+
+@pytest.mark.parametrize(("speed", "held"), [("1", 250.0), ("12", 0.0)], ids=["behind a slow one", "in free traffic"])
+def test_time_in_a_queue_is_what_the_ego_loses_behind_slow_ones(
+    tmp_path: Path, plain_file: Callable[..., Path], speed: str, held: float
+) -> None:
+    net = plain_file(
+        '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/>', '<edge id="we" from="w" to="e" speed="13.9"/>'
+    )
+    routes = (
+        f'<vType id="slow" maxSpeed="{speed}"/><vehicle id="other" type="slow" depart="0" departPos="95">'
+        '<route edges="we"/></vehicle><trip id="ego" from="we" to="we" depart="1"/>'
+    )
+    scenario = traffic(tmp_path, net, routes, end="600")
+    trips = [Trip("ego", 1.0, 395.0, 29.0, 400.0)]
+    ((result,), (native,)) = (
+        in_child(partial(driven, scenario, StackSource(), trips, 1, HEAR)).results,
+        in_child(partial(anchored, scenario, trips, HEAR)).results,
+    )
+    if speed == "1":
+        assert (result.outcome, native.outcome) == (TripOutcome.TIME_OVER, TripOutcome.ARRIVED)
+        assert result.held > 0.8 * (result.duration - 15.0)
+        assert native.held > held
+    else:
+        assert result.held == native.held == held
+
+
+def test_an_ego_is_not_held_up_by_a_queue_that_another_ego_heads(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    net = plain_file(
+        '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/>', '<edge id="we" from="w" to="e" speed="13.9"/>'
+    )
+    routes = (
+        '<vehicle id="parked" depart="0" departPos="195"><route edges="we"/><stop lane="we_0" endPos="200" '
+        'duration="1000"/></vehicle><trip id="head" from="we" to="we" depart="1" departPos="100"/>'
+        '<trip id="between" from="we" to="we" depart="5"/><trip id="tail" from="we" to="we" depart="15"/>'
+    )
+    scenario = traffic(tmp_path, net, routes, end="400")
+    trips = [Trip(name, at, 395.0, 29.0, 40.0) for name, at in (("head", 1.0), ("tail", 15.0))]
+    head, tail = in_child(partial(driven, scenario, StackSource(), trips, 2, HEAR)).results
+    assert (head.ego, tail.ego) == ("head", "tail")
+    assert {head.outcome, tail.outcome} == {TripOutcome.TIME_OVER}
+    assert head.held == 0.0
+    assert tail.held <= tail.start + tail.duration - head.start - head.duration  # with `head` gone, others hold it up
 
 
 @pytest.mark.parametrize(

@@ -159,3 +159,36 @@ def test_a_destination_is_excused_only_where_sumos_driver_was_held_up_as_long(re
         native = TripResult("ego", TripOutcome.ARRIVED, duration=taken)
         assert [one.fault for one in excused(late, native).violations] == [fault]
     assert all(result == excused(result, result) for result in reckless.ads)
+
+
+@pytest.mark.parametrize(
+    ("held", "distance", "kinds", "fault"),
+    [
+        (140.0, 900.0, [], Fault.OTHER),
+        (60.0, 900.0, [], Fault.DRIVER),
+        (140.0, 300.0, [], Fault.DRIVER),
+        (140.0, 900.0, ["no_progress"], Fault.DRIVER),
+    ],
+    ids=["in time but for queues", "too slow besides", "too much left to drive", "stood for no reason"],
+)
+def test_a_destination_is_excused_where_the_ego_was_held_up_in_queues_and_is_quick_besides(
+    held: float, distance: float, kinds: list[str], fault: Fault
+) -> None:
+    """SUMO's driver took 120 s for 1 000 m, 20 s of them in queues; an ego may take 1.5 times its 100 s besides."""
+    violations = [
+        Judged(
+            "destination" if kind.startswith("destination") else kind,
+            Violation(kind, Category.MISSION, 99.0, None, (0.0, 0.0), None, 40.0, 3.0, ""),
+            Fault.DRIVER,
+            "",
+        )
+        for kind in [*kinds, "destination_not_reached"]
+    ]
+    late = TripResult(
+        "ego", TripOutcome.TIME_OVER, distance=distance, duration=250.0, held=held, violations=tuple(violations)
+    )
+    native = TripResult("ego", TripOutcome.ARRIVED, distance=1000.0, duration=120.0, held=20.0)
+    assert excused(late, native).violations[-1].fault is fault
+    assert excused(late, native).violations[:-1] == late.violations[:-1]
+    untold = TripResult("ego", TripOutcome.NOT_DRIVEN)
+    assert excused(late, untold) == late
