@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -56,5 +57,17 @@ class Store(Generic[Kept]):
 
 
 def key_of(parts: Sequence[object]) -> str:
-    """One key for equal questions, on every machine."""
-    return hashlib.blake2b(msgspec.json.encode(parts), digest_size=12).hexdigest()
+    """One key for equal questions to the same code, on every machine: what other code has found is not taken for it."""
+    return _digest(msgspec.json.encode([parts, _sources()]))
+
+
+@cache
+def _sources() -> str:
+    """Of this package's code; its version does not change with each edit."""
+    folder = Path(__file__).parent
+    files = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.py"))
+    return _digest(b"".join(b"%s\0%s\0" % (name.encode(), (folder / name).read_bytes()) for name in files))
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.blake2b(content, digest_size=12).hexdigest()

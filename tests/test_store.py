@@ -1,10 +1,14 @@
 """Nothing that was found is lost, and nothing stale is believed."""
 
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 from bench.scores import score
 
+import dvca_sumo
 from dvca_sumo.bench.score import Score
 from dvca_sumo.store import Store, StoreError, key_of
 
@@ -44,3 +48,20 @@ def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
 def test_equal_questions_have_equal_keys_and_others_others() -> None:
     assert key_of([1, "a"]) == key_of([1, "a"])
     assert len({key_of([1, "a"]), key_of(["a", 1]), key_of([1, "b"])}) == 3
+
+
+def test_what_other_code_has_found_is_not_believed(tmp_path: Path) -> None:
+    """Who edits the driver and asks again in the same folder gets new answers."""
+    copy = tmp_path / "dvca_sumo"
+    shutil.copytree(Path(dvca_sumo.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+
+    def key() -> str:
+        code = "from dvca_sumo.store import key_of; print(key_of(['question']))"
+        words = [sys.executable, "-c", code]
+        return subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True).stdout  # noqa: S603 ours
+
+    before = key()
+    assert key() == before
+    planner = copy / "stack" / "planning" / "planner.py"
+    planner.write_text(planner.read_text() + "\n")
+    assert key() != before
