@@ -1,5 +1,6 @@
 """The simulated world: SUMO's traffic and the egos that move in it by their own dynamics."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -57,6 +58,7 @@ class World:
         """
         wanted, end = self._scenario.ego, self._scenario.end
         earliest = self._scenario.begin + AUTO_DELAY
+        unfit = Counter[str]()
         while (end is None or self.time < end) and not self.is_exhausted:
             self._session.step()
             if self._session.delay(wanted) > LONGEST_DELAY:
@@ -64,12 +66,22 @@ class World:
             for name in self._session.departed():
                 if name == wanted:
                     return self._session.entry(name, settings)
-                if wanted == AUTO and self.time >= earliest:
-                    entry = self._session.entry(name, settings)
-                    if entry.vehicle_class in CARS and is_fit(entry):
-                        return entry
+                if wanted != AUTO:
+                    continue
+                if self.time < earliest:
+                    unfit[f"before {earliest:g} s"] += 1
+                    continue
+                entry = self._session.entry(name, settings)
+                if entry.vehicle_class not in CARS:
+                    unfit[f"of class {entry.vehicle_class}"] += 1
+                elif not is_fit(entry):
+                    unfit["without a trip that can be driven and is long enough"] += 1
+                else:
+                    return entry
         whom = "no vehicle fit to be the ego" if wanted == AUTO else f"the ego {wanted!r} never"
-        raise ScenarioError(f"{whom} departs between {self._scenario.begin:g} s and {self.time:g} s")
+        them = ", ".join(f"{count} {how}" for how, count in sorted(unfit.items())) or "none"
+        others = f"; departed: {them}" if wanted == AUTO else ""
+        raise ScenarioError(f"{whom} departs between {self._scenario.begin:g} s and {self.time:g} s{others}")
 
     def departed(self) -> tuple[str, ...]:
         """Vehicles that departed in the last step."""

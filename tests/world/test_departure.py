@@ -36,8 +36,15 @@ def test_auto_says_when_no_trip_is_fit(tmp_path: Path, street: Path) -> None:
     def job() -> None:
         World(scenario, tmp_path).await_ego((), lambda _: False)
 
-    with pytest.raises(ScenarioError, match="no vehicle fit to be the ego departs between 0 s and 65 s"):
+    says = r"no vehicle fit to be the ego departs between 0 s and 65 s; departed: \d+ before 60 s, \d+ without a trip"
+    with pytest.raises(ScenarioError, match=says):
         in_child(job)
+
+
+def test_auto_says_of_what_class_those_are_that_depart(tmp_path: Path, street: Path) -> None:
+    bus = '<vType id="bus" vClass="bus"/><vehicle id="bus" type="bus" depart="60"><route edges="nb bs"/></vehicle>'
+    with pytest.raises(ScenarioError, match=r"between 0 s and .* s; departed: 1 of class bus$"):
+        entered(scenario_file(tmp_path, street, bus), ego="auto")
 
 
 def test_an_ego_whose_time_comes_after_the_end_never_departs(tmp_path: Path, street: Path) -> None:
