@@ -13,7 +13,7 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.keeping import kept
 from dvca_sumo.stack.planning.moves import Lateral, Move, blend_length, feasible_length, roomy_length
-from dvca_sumo.stack.planning.path import Plateau
+from dvca_sumo.stack.planning.path import Plateau, way_back
 from dvca_sumo.stack.planning.reference import Window
 from dvca_sumo.stack.planning.room import room_beside
 from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags, Scene
@@ -24,6 +24,7 @@ _UNSURE = 0.08  # [m] less room than wanted at least does not end a nudge: noise
 _DRIVING = 1.0  # [s] of moving: what is seen first may seem to move for less
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane
 _CLOSING = 2.0  # [s] of closing speed kept to those who come from behind
+_AT = 0.05  # [m] from an offset, the ego is at it
 _SURE = 1.0  # [s] for which nobody has come alongside who did before, until the ego leaves its lane
 
 
@@ -93,10 +94,14 @@ class NudgeDecider:
         self._driven.update(track for track, since in self._moving.items() if situation.time - since > _DRIVING)
         nudges = []
         found, beside = blockers(scene, situation.window, situation.speed, self._held, self._shape, self._config)
+        last = self._present(situation)
         for blocker in found:
             plateau = self._plateau(blocker, situation)
+            if last is not None and self._goes_on(blocker, plateau, last, situation):
+                plateau = self._passed_at(blocker, last.offset)
             if plateau is not None:
                 nudges.append(Nudge(blocker.track, plateau))
+                last = plateau
         self._held = {
             nudge.track: Plateau(station + begin, station + end, offset)
             for nudge in nudges
@@ -150,6 +155,36 @@ class NudgeDecider:
             move = Move(situation.lateral, offset, 0.0, begin)
             begin = feasible_length(move, situation.speed, situation.window, self._config)
         return Plateau(begin, max(end, begin), offset)
+
+    def _present(self, situation: Situation) -> Plateau | None:
+        """Where the ego is, on one of the last cycle's plateaus or past it; None if it is on none."""
+        offset = situation.lateral.offset
+        held = [plateau.offset for plateau in self._held.values() if abs(plateau.offset - offset) < _AT]
+        return Plateau(0.0, 0.0, min(held, key=lambda one: abs(one - offset))) if held else None
+
+    def _goes_on(self, blocker: Blocker, plateau: Plateau | None, last: Plateau, situation: Situation) -> bool:
+        """Whether the ego passes an object as far aside as what it passed before, though it need not.
+
+        On less way than it takes to go back and out again, its front would turn towards it.
+        """
+        offset, wanted = last.offset, 0.0 if plateau is None else plateau.offset
+        if blocker.walks or wanted * offset < 0.0 or abs(wanted) >= abs(offset) or self._meets_another(blocker, offset):
+            return False
+        if blocker.clearance(offset) < blocker.clearance(wanted):
+            return False
+        window, speed = situation.window, situation.speed
+        back = way_back(Lateral(offset, 0.0, 0.0), last.end, speed, window, self._shape, self._config)
+        out = blend_length(wanted, speed, self._config)
+        if self._passed_at(blocker, offset).begin > last.end + back.length + out:
+            return False
+        least = self._config.nudge_clearance_least
+        room = room_beside(blocker, window, speed, least, self._shape, self._config)
+        return room.is_in_lane(offset) or self._may_leave_lane(blocker, offset, 0.0, situation)
+
+    def _passed_at(self, blocker: Blocker, offset: float) -> Plateau:
+        """Where to be at an offset to pass an object that stands."""
+        begin = blocker.low - self._shape.front - LENGTHWISE
+        return Plateau(begin, max(blocker.high + self._shape.rear_overhang + LENGTHWISE, begin), offset)
 
     def _choices(self, blocker: Blocker, situation: Situation) -> Iterator[float]:
         """Offsets to pass at, best first: on the side of the last cycle if that still works, else the smaller one.
