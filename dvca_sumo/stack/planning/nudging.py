@@ -1,14 +1,14 @@
 """The path decision: around what stands in the way, on which side and by how much, or not at all."""
 
 import math
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Sequence
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from dvca_sumo.messages import Floats, ObjectClass, VehicleShape
-from dvca_sumo.stack.planning.blockers import LENGTHWISE, PARALLEL, SLOWEST, Blocker, blockers
+from dvca_sumo.stack.planning.blockers import LENGTHWISE, PARALLEL, SLOWEST, Beside, Blocker, blockers
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.keeping import kept
@@ -92,7 +92,7 @@ class NudgeDecider:
         self._taken = {key: taken for key, taken in self._taken.items() if key[0] in scene.ids}
         self._driven &= set(scene.ids)
         self._driven.update(track for track, since in self._moving.items() if situation.time - since > _DRIVING)
-        nudges = []
+        passed: list[tuple[Blocker, Plateau]] = []
         found, beside = blockers(scene, situation.window, situation.speed, self._held, self._shape, self._config)
         last = self._present(situation)
         for blocker in found:
@@ -100,8 +100,9 @@ class NudgeDecider:
             if last is not None and self._goes_on(blocker, plateau, last, situation):
                 plateau = self._passed_at(blocker, last.offset)
             if plateau is not None:
-                nudges.append(Nudge(blocker.track, plateau))
+                passed.append((blocker, plateau))
                 last = plateau
+        nudges = [Nudge(blocker.track, plateau) for blocker, plateau in self._reconciled(passed, beside)]
         self._held = {
             nudge.track: Plateau(station + begin, station + end, offset)
             for nudge in nudges
@@ -181,6 +182,31 @@ class NudgeDecider:
         room = room_beside(blocker, window, speed, least, self._shape, self._config)
         return room.is_in_lane(offset) or self._may_leave_lane(blocker, offset, 0.0, situation)
 
+    def _reconciled(self, passed: Sequence[tuple[Blocker, Plateau]], standing: Beside) -> list[tuple[Blocker, Plateau]]:
+        """Where others, soon before or after one, could not be passed as far aside as it, it is as little as need be.
+
+        Beside it, the ego stays as far aside as it is. Those that are stopped for do not count.
+        """
+        least = self._config.nudge_clearance_least
+        clear = standing.of(standing.clearances(0.0) >= least)
+        found = []
+        for blocker, plateau in passed:
+            offset = plateau.offset
+            way = blend_length(offset, SLOWEST, self._config) + LENGTHWISE
+            begin, end = plateau.begin - way - self._shape.rear_overhang, plateau.end + way + self._shape.front
+            in_way = (clear.low < end) & (clear.high > begin) & (clear.clearances(offset) < least)
+            is_close = bool(in_way.any()) or any(
+                one.low < end and one.high > begin and one.clearance(offset) < least
+                for one, _ in passed
+                if not one.walks
+            )
+            if is_close and not blocker.walks:
+                is_ahead = blocker.low > self._shape.front
+                offset = self._tightened(blocker, offset) if is_ahead else self._held_offset(blocker.track)
+            if offset:
+                found.append((blocker, plateau._replace(offset=offset)))
+        return found
+
     def _passed_at(self, blocker: Blocker, offset: float) -> Plateau:
         """Where to be at an offset to pass an object that stands."""
         begin = blocker.low - self._shape.front - LENGTHWISE
@@ -208,14 +234,14 @@ class NudgeDecider:
                     yield held
                 yield beside
         has_lane = room.lane_right <= room.lane_left and not turns_in
-        if has_lane and (blocker.walks or self._will_stay(blocker, situation)):
+        may_pass = has_lane and (blocker.walks or self._will_stay(blocker, situation))
+        if may_pass:
             inside = (min(max(offset, room.lane_right), room.lane_left) for offset in wanted)
             yield from (self._sparing(blocker, offset, situation) for offset in inside if self._clears(blocker, offset))
         for offset in wanted:
-            if not self._meets_another(blocker, offset):
-                tight = self._tightened(blocker, offset)
-                if self._may_leave_lane(blocker, tight, begun, situation):
-                    yield tight
+            tight = self._tightened(blocker, offset)
+            if (may_pass and room.is_in_lane(tight)) or self._may_leave_lane(blocker, tight, begun, situation):
+                yield tight
 
     def _held_offset(self, track: int) -> float:
         """The offset of the last cycle; 0 without one."""

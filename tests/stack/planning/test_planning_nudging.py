@@ -291,8 +291,51 @@ def test_two_cones_one_behind_the_other_are_passed_in_one_go() -> None:
     assert driven.clearances.min() >= 0.4
 
 
+def test_what_follows_on_the_same_side_is_passed_without_turning_back_towards_it() -> None:
+    """It leaves room also on the line: but the front, on its way back there, would take that."""
+    actors = [person(3, 110.7, -1.2), car(1, 123.5, -2.34, size=(8.0, 1.8))]
+    driven = drive(road(), 30.0, speed=8.0, station=60.0, actors=actors)
+    assert driven.fronts[-1] > 150.0
+    assert driven.clearances.min() > 0.4
+    beside = (driven.fronts > 113.0) & (driven.states[:, 1] < 127.0)
+    assert driven.states[beside, 2].min() > 0.3
+    assert driven.states[beside, 5].min() > -1.0
+
+
+@pytest.mark.parametrize(
+    "actors",
+    [
+        [cone(1, 71.5, 1.53), car(2, 78.8, -2.19, size=(8.0, 1.8))],
+        [person(1, 84.7, -1.46), cone(2, 90.7, 1.68)],
+        [person(1, 88.6, 1.76), car(2, 98.1, -2.09)],
+        [car(1, 74.7, -2.53, size=(8.0, 1.8)), car(2, 86.6, 2.06, size=(8.0, 1.8))],
+    ],
+    ids=["cone, car", "person, cone", "person, car", "cars"],
+)
+@pytest.mark.parametrize("speed", [3.0, 8.0])
+def test_those_on_either_side_one_soon_after_the_other_are_passed_as_far_aside_as_both_allow(
+    actors: list[Actor], speed: float
+) -> None:
+    """With all the room wanted beside the first, the second could not be reached."""
+    route = road()
+    wide = msgspec.structs.replace(route, road_left=route.road_left + 0.5, road_right=route.road_right - 0.5)
+    driven = drive(wide, 40.0, speed=speed, station=40.0, actors=actors)
+    assert driven.fronts[-1] > 110.0
+    assert driven.clearances.min() > 0.3
+    assert driven.states[:, 5].min() > -3.5
+
+
+def test_who_is_stopped_for_costs_nobody_before_them_the_room_they_want() -> None:
+    line = stop_line(128.0, Control.SIGNAL)
+    actors = [person(3, 110.0, -1.2), car(1, 120.5)]
+    driven = drive(road(stop_lines=[line]), 20.0, speed=8.0, station=60.0, actors=actors)
+    assert driven.speeds[-1] == 0.0
+    beside = (driven.fronts > 110.0) & (driven.states[:, 1] < 110.0)
+    assert driven.states[beside, 2].min() > 0.3
+
+
 def test_gap_between_two_objects_that_is_too_narrow_is_stopped_for() -> None:
-    driven = drive(road(lanes_left=1), 25.0, speed=12.0, actors=[cone(5, 110.0, -0.9), cone(6, 110.0, 2.1)])
+    driven = drive(road(lanes_left=1), 25.0, speed=12.0, actors=[cone(5, 110.0, -0.9), cone(6, 110.0, 2.05)])
     assert driven.speeds[-1] == 0.0
     assert driven.clearances.min() > 2.0
 
