@@ -21,13 +21,14 @@ from dvca_sumo.stack.planning.lane_changing import LaneChanger, LaneChoice
 from dvca_sumo.stack.planning.lane_gaps import Gaps
 from dvca_sumo.stack.planning.limits import nearest_stop, speed_caps
 from dvca_sumo.stack.planning.meeting import Demand, Meetings
-from dvca_sumo.stack.planning.nudging import Nudge, NudgeDecider, Situation
+from dvca_sumo.stack.planning.nudging import Nudge, NudgeDecider
 from dvca_sumo.stack.planning.oncoming import waits
 from dvca_sumo.stack.planning.passing import Passing
 from dvca_sumo.stack.planning.path import Path, lateral_start, path_along
 from dvca_sumo.stack.planning.reference import BEHIND, Reference
 from dvca_sumo.stack.planning.scene import scene_in
 from dvca_sumo.stack.planning.settling import Settling
+from dvca_sumo.stack.planning.situation import Situation
 from dvca_sumo.stack.planning.speed import Profile, Stop, roll_out
 from dvca_sumo.stack.planning.st_graph import Graph, graph_of, leader_of, leading
 from dvca_sumo.stack.planning.standing import Standing
