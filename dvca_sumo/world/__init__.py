@@ -66,18 +66,14 @@ class World:
             for name in self._session.departed():
                 if name == wanted:
                     return self._session.entry(name, settings)
-                if wanted != AUTO:
-                    continue
-                if self.time < earliest:
+                if wanted == AUTO and self.time < earliest:
                     unfit[f"before {earliest:g} s"] += 1
-                    continue
-                entry = self._session.entry(name, settings)
-                if entry.vehicle_class not in CARS:
-                    unfit[f"of class {entry.vehicle_class}"] += 1
-                elif not is_fit(entry):
-                    unfit["without a trip that can be driven and is long enough"] += 1
-                else:
-                    return entry
+                elif wanted == AUTO:
+                    entry = self._session.entry(name, settings)
+                    objection = _objection(entry, is_fit)
+                    if not objection:
+                        return entry
+                    unfit[objection] += 1
         whom = "no vehicle fit to be the ego" if wanted == AUTO else f"the ego {wanted!r} never"
         them = ", ".join(f"{count} {how}" for how, count in sorted(unfit.items())) or "none"
         others = f"; departed: {them}" if wanted == AUTO else ""
@@ -170,3 +166,10 @@ class World:
     def close(self) -> None:
         """End the simulation."""
         self._session.close()
+
+
+def _objection(entry: Entry, is_fit: Callable[[Entry], bool]) -> str:
+    """Why `auto` does not choose a vehicle; empty if it does."""
+    if entry.vehicle_class not in CARS:
+        return f"of class {entry.vehicle_class}"
+    return "" if is_fit(entry) else "without a trip that can be driven and is long enough"
