@@ -42,6 +42,7 @@ class NudgeDecider:
         self._staying = Staying(shape, config)
         self._sides = Sides(shape, config)
         self._held: dict[int, Plateau] = {}  # by track: the last cycle's, in route stations
+        self._followers: set[int] = set()  # tracks that were passed as far aside as those before them
 
     @property
     def stood(self) -> Container[int]:
@@ -58,14 +59,18 @@ class NudgeDecider:
         self._sides.see(situation)
         passed: list[tuple[Blocker, Plateau]] = []
         found, beside = blockers(scene, situation.window, situation.speed, self._held, self._shape, self._config)
-        last = self._present(situation)
+        last: Plateau | None = None
+        followers = set()
         for blocker in found:
             plateau = self._plateau(blocker, situation)
-            if last is not None and self._goes_on(blocker, plateau, last, situation):
-                plateau = self._passed_at(blocker, last.offset)
+            before = last or self._present(blocker.track, situation)
+            if before is not None and self._goes_on(blocker, plateau, before, situation):
+                plateau = self._passed_at(blocker, before.offset)
+                followers.add(blocker.track)
             if plateau is not None:
                 passed.append((blocker, plateau))
                 last = plateau
+        self._followers = followers
         nudges = [Nudge(blocker.track, plateau) for blocker, plateau in self._reconciled(passed, beside)]
         self._held = {
             nudge.track: Plateau(station + begin, station + end, offset)
@@ -121,10 +126,17 @@ class NudgeDecider:
             begin = feasible_length(move, situation.speed, situation.window, self._config)
         return Plateau(begin, max(end, begin), offset)
 
-    def _present(self, situation: Situation) -> Plateau | None:
-        """Where the ego is, on one of the last cycle's plateaus or past it; None if it is on none."""
-        offset = situation.lateral.offset
-        held = [plateau.offset for plateau in self._held.values() if abs(plateau.offset - offset) < _AT]
+    def _present(self, follower: int, situation: Situation) -> Plateau | None:
+        """Where the ego is: at a plateau of the last cycle, or past it, for another one than `follower` (a track).
+
+        None if it is at none.
+        """
+        offset, is_one = situation.lateral.offset, follower in self._followers
+        held = [
+            plateau.offset
+            for track, plateau in self._held.items()
+            if abs(plateau.offset - offset) < _AT and (is_one or track != follower)
+        ]
         return Plateau(0.0, 0.0, min(held, key=lambda one: abs(one - offset))) if held else None
 
     def _goes_on(self, blocker: Blocker, plateau: Plateau | None, last: Plateau, situation: Situation) -> bool:
