@@ -91,13 +91,8 @@ def blockers(
     closing = np.maximum(speed - speeds, 0.0)
     way = closing * closing / (2.0 * config.comfort_braking) + LENGTHWISE
     is_beside = is_held & (now.stations - now.half_lengths < shape.front + way)
-    rows = now.rows(window)
-    swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
     limits = wanted + config.nudge_hold * is_held
-    near = now.gaps(swept_left, swept_right) < limits + _DOUBT
-    near &= scene.is_standing | is_beside | walks
-    near &= now.stations + now.half_lengths > -shape.rear_overhang - LENGTHWISE
-    near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
+    near = (scene.is_standing | is_beside | walks) & _may_be_passed_closer(limits, scene, window, shape)
     if not near.any():
         return [], _NOBODY
     near &= _beside(scene, window, near).clearances(0.0) < limits
@@ -125,6 +120,16 @@ def blockers(
             )
         )
     return sorted(found, key=lambda blocker: blocker.low), beside.of(scene.is_standing)
+
+
+def _may_be_passed_closer(limits: Floats, scene: Scene, window: Window, shape: VehicleShape) -> Flags:
+    """Which objects (n,) on the way ahead, going by their extents, may be closer than `limits` (n,) [m]."""
+    now, rows = scene.now, scene.now.rows(window)
+    swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
+    near: Flags = now.gaps(swept_left, swept_right) < limits + _DOUBT
+    near &= now.stations + now.half_lengths > -shape.rear_overhang - LENGTHWISE
+    near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
+    return near
 
 
 def _standing_alongside(row: int, low: float, high: float, scene: Scene, beside: Beside, shape: VehicleShape) -> Flags:

@@ -116,8 +116,7 @@ class NudgeDecider:
 
     def _reached(self, blocker: Blocker, offset: float, situation: Situation) -> Plateau:
         """Where the offset can be reached and left. A move once begun later than that ends where it did before."""
-        begin = blocker.low - self._shape.front - LENGTHWISE
-        end = blocker.high + self._shape.rear_overhang + LENGTHWISE
+        begin, end, _ = self._passed_at(blocker, offset)
         end += blocker.speed * end / max(situation.speed - blocker.speed, SLOWEST)
         if offset == self._held_offset(blocker.track):
             begin = max(begin, self._held[blocker.track].begin - situation.window.station)
@@ -163,6 +162,8 @@ class NudgeDecider:
 
         Beside it, the ego stays as far aside as it is. Those that are stopped for do not count.
         """
+        if not passed:
+            return []
         least = self._config.nudge_clearance_least
         clear = standing.of(standing.clearances(0.0) >= least)
         found = []
@@ -186,7 +187,7 @@ class NudgeDecider:
     def _passed_at(self, blocker: Blocker, offset: float) -> Plateau:
         """Where to be at an offset to pass an object that stands."""
         begin = blocker.low - self._shape.front - LENGTHWISE
-        return Plateau(begin, max(blocker.high + self._shape.rear_overhang + LENGTHWISE, begin), offset)
+        return Plateau(begin, blocker.high + self._shape.rear_overhang + LENGTHWISE, offset)
 
     def _choices(self, blocker: Blocker, situation: Situation) -> Iterator[float]:
         """Offsets to pass at, best first: on the side of the last cycle if that still works, else the smaller one.
