@@ -29,6 +29,7 @@ class Keeping(msgspec.Struct, frozen=True, eq=False):
     """What a lane that is not the route's asks of a cycle."""
 
     offsets: Floats  # (n,) of its centre from the window's line [m]
+    begin: int  # row from which on it is there
     width: float  # [m]
     stop: Stop | None  # before the way to the route's lane is too short; places along the window's line
 
@@ -97,14 +98,24 @@ class LaneChanger:
         if target == last:
             return LaneChoice(behind=behind)
         pace = self._gaps.pace(occupied[target + 1], change, window, speed)
-        return LaneChoice(keeping(change, target, window, stop), behind, pace)
+        return LaneChoice(keeping(change, target, window, speed, stop, self._config), behind, pace)
 
 
-def keeping(change: LaneChange, lane: int, window: Window, stop: Stop | None) -> Keeping:
-    """Keeping to one of the lanes of `change`, by its place in them."""
+def keeping(
+    change: LaneChange, lane: int, window: Window, speed: float, stop: Stop | None, config: PlanningConfig
+) -> Keeping:
+    """Keeping to one of the lanes of `change`, by its place in them.
+
+    An ego that comes to them along the line is not there yet: out of a tight turn, not even on the first one.
+    """
     stations = window.station + np.arange(window.rows.shape[1]) - BEHIND
-    offsets = np.interp(stations, change.stations, change.offsets[lane])
-    return Keeping(offsets, change.widths[lane], stop)
+    offsets, begin = np.interp(stations, change.stations, change.offsets[lane]), 0
+    if window.station < change.start_station:
+        begin = int(stations.searchsorted(change.start_station))
+        way = blend_length(max(change.widths), max(speed, LAST_SPEED), config)
+        share = np.minimum(np.maximum((stations - change.start_station) / way, 0.0), 1.0)
+        offsets *= share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    return Keeping(offsets, begin, change.widths[lane], stop)
 
 
 def letting_in(lanes: Sequence[Neighbours], shape: VehicleShape) -> frozenset[int]:

@@ -94,7 +94,7 @@ class Passing:
         behind = letting_in([occupied[target]], shape) if target != self._lane else frozenset()
         self._target = target
         if target == _BESIDE:
-            return LaneChoice(keeping(way, _BESIDE, window, stop), behind, pace)
+            return LaneChoice(keeping(way, _BESIDE, window, speed, stop, config), behind, pace)
         if self._lane == target == wish:
             return None
         return LaneChoice(None, behind, pace)

@@ -117,7 +117,7 @@ class Planner:
         if choice is None:
             choice = self._lane_changer.step(window, offset, start.speed, predicted.objects)
         if choice.keeping is not None:
-            window = window.moved(choice.keeping.offsets, choice.keeping.width)
+            window = window.moved(choice.keeping.offsets, choice.keeping.begin, choice.keeping.width)
             offset -= float(choice.keeping.offsets[BEHIND])
         scene = scene_in(window, predicted, time, self._nudging.stood, config)
         nose = station if config.lines_at_rear_axle else station + shape.front

@@ -66,8 +66,8 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         rows = self.rows[:, : BEHIND + max(int(turns.argmax()), 1)]
         return Window(self.station, rows, *rows)
 
-    def moved(self, offsets: Floats, width: float) -> "Window":
-        """The window of a line beside this one, at `offsets` (n,) [m], along a lane so wide [m].
+    def moved(self, offsets: Floats, begin: int, width: float) -> "Window":
+        """The window of a line beside this one, at `offsets` (n,) [m], from row `begin` on along a lane so wide [m].
 
         Its stations are those of this line.
         """
@@ -80,7 +80,8 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         rows[_COS], rows[_SIN], rows[_HEADING] = np.cos(headings), np.sin(headings), headings
         rows[_CURVATURE] = np.gradient(headings) / np.hypot(slopes, scale)
         rows[_LIMIT] = self.speed_limits
-        rows[_LANE_LEFT], rows[_LANE_RIGHT] = 0.5 * width, -0.5 * width
+        rows[_LANE_LEFT], rows[_LANE_RIGHT] = self.lane_left, self.lane_right
+        rows[_LANE_LEFT, begin:], rows[_LANE_RIGHT, begin:] = 0.5 * width, -0.5 * width
         rows[_ROAD_LEFT], rows[_ROAD_RIGHT] = self.road_left - offsets, self.road_right - offsets
         rows[_SWEPT_LEFT], rows[_SWEPT_RIGHT] = self.swept_left, self.swept_right
         return Window(self.station, rows, *rows)

@@ -118,6 +118,26 @@ def test_over_two_lanes_it_waits_on_the_middle_one() -> None:
     assert_drivable(driven)
 
 
+def test_before_the_lanes_run_side_by_side_it_is_on_none_of_them_but_its_own() -> None:
+    """Though it is decided already that it waits on the middle one."""
+    driven = drive(crossing_over(2), 12.0, speed=8.0, actors=[car(7, 7.0, 2.0 * WIDTH, speed=8.0)])
+    states = driven.states[driven.states[:, 1] < START]
+    assert states[-1, 1] > START - 2.0
+    assert np.abs(states[:, 2]).max() < 0.1
+
+
+def test_where_a_turn_leads_past_the_first_lane_it_is_not_beside_the_line_before() -> None:
+    """The line swings over to the lane on the left where the two begin, back to the first one, and changes then."""
+    route, beside = crossing_over(), car(7, 7.0, WIDTH, speed=8.0)
+    change = route.lane_changes[0]
+    swings = np.interp(change.stations, [START, START + 12.0], [-2.8, 0.0])
+    swung = msgspec.structs.replace(change, offsets=change.offsets + swings)
+    driven = drive(msgspec.structs.replace(route, lane_changes=(swung,)), 12.0, speed=8.0, actors=[beside])
+    states = driven.states[driven.states[:, 1] < START]
+    assert states[-1, 1] > START - 2.0
+    assert np.abs(states[:, 2]).max() < 0.1
+
+
 def test_one_that_pulls_into_the_gap_in_time_is_let_in() -> None:
     """A gap that closes while the ego is still in its lane is given up."""
     start = START - SHAPE.front
