@@ -107,7 +107,7 @@ def _contact_of(moment: Moment, row: int, *, stands: bool) -> Contact:
     ego, shape = moment.ego, moment.shape
     box = moment.objects.boxes[row]
     angle = math.atan2(box[1] - ego.y, box[0] - ego.x) - ego.heading
-    if abs(math.remainder(angle, math.tau)) > _BEHIND and ego.speed > 0.0:
+    if abs(math.remainder(angle, math.tau)) > _BEHIND and ego.speed >= 0.0:
         return Contact.HIT_FROM_BEHIND
     x, y = ego.x + shape.front * math.cos(ego.heading), ego.y + shape.front * math.sin(ego.heading)
     bumper = np.array([x, y, ego.heading, 0.0, shape.width])

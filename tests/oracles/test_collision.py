@@ -95,6 +95,12 @@ def test_a_car_that_hits_the_driving_ego_from_behind_is_told_apart() -> None:
     assert violation.contact is Contact.HIT_FROM_BEHIND
 
 
+def test_a_car_that_hits_the_ego_from_behind_as_it_comes_to_a_stop_is_told_apart() -> None:
+    moments = [moment(0.1 * k, 50.0, 0.2 * (1 - k), objects=[car("late", 40.0 + k, speed=10.0)]) for k in range(2)]
+    (violation,) = judged(Collision, moments).violations
+    assert violation.contact is Contact.HIT_FROM_BEHIND
+
+
 def test_a_contact_at_the_flank_is_a_side_contact() -> None:
     moments = [
         moment(
