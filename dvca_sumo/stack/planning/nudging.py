@@ -65,7 +65,8 @@ class NudgeDecider:
             plateau = self._plateau(blocker, situation)
             before = last or self._present(blocker.track, situation)
             if before is not None and self._goes_on(blocker, plateau, before, situation):
-                plateau = self._passed_at(blocker, before.offset)
+                begin, end, offset = self._passed_at(blocker, before.offset)
+                plateau = Plateau(max(begin, before.begin), max(end, before.begin), offset)
                 followers.add(blocker.track)
             if plateau is not None:
                 passed.append((blocker, plateau))
@@ -85,7 +86,7 @@ class NudgeDecider:
 
         Where it cannot be reached before the object is passed, the front staying in the lane or on the road, it is the
         smallest move possible, if one is needed at all; not for who walks. Beside it, the ego does not turn back
-        towards it, however little room it has.
+        towards it, however little room it has. For what it goes by anyway it begins no move that is not comfortable.
         """
         late = []
         latest, is_clear = blocker.high, self._clears(blocker, 0.0)
@@ -93,6 +94,8 @@ class NudgeDecider:
             # In the second half of the move, the front, turned outwards, is as far aside as the ego is going to be.
             room = blocker.low - self._shape.front
             latest = min(room + min(room, self._shape.front), latest)
+        goes_by = situation.speed >= self._config.standing_speed and blocker.low < self._shape.front
+        is_unhurried = (is_clear or goes_by) and blocker.track not in self._held
         for offset in self._choices(blocker, situation):
             if self._meets_another(blocker, offset):
                 continue
@@ -104,6 +107,8 @@ class NudgeDecider:
             move = Move(situation.lateral, offset, 0.0, soonest.begin)
             roomy = roomy_length(move, situation.window, self._shape)
             begin = max(soonest.begin, min(roomy, latest))
+            if is_unhurried:
+                begin = max(begin, blend_length(offset - situation.lateral.offset, situation.speed, self._config))
             plateau = Plateau(begin, max(soonest.end, begin), offset)
             if roomy <= begin <= blocker.high:
                 return plateau

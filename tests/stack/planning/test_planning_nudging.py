@@ -25,6 +25,7 @@ from dvca_sumo.geometry.boxes import box_of, distances
 from dvca_sumo.messages import Floats, ObjectClass
 from dvca_sumo.roadmap.route import Control
 from dvca_sumo.stack.planning import PlanningConfig
+from dvca_sumo.world import VehicleLimits
 
 
 def offsets(driven: Drive) -> tuple[float, float]:
@@ -458,6 +459,35 @@ def test_for_people_who_stand_beside_it_on_the_inside_of_a_bend_the_ego_moves_as
     assert sweeps(driven, route).min() > sweeps(alone, route).min() - 0.2
     assert driven.clearances.min() > 0.25
     assert driven.states[-1, 2] > 100.0
+
+
+@pytest.mark.parametrize("speed", [2.0, 4.0])
+@pytest.mark.parametrize("aside", [2.0, 2.1])
+def test_for_a_car_that_it_goes_by_already_in_a_bend_the_ego_does_not_turn_the_wheels_farther_than_they_go(
+    aside: float, speed: float
+) -> None:
+    """To the right, and the car on the left: a move away from it adds to the bend."""
+    route = road(curve_points(6.5, before=60.0) * [1.0, -1.0])
+    x, y, heading = route.line.poses(np.array([65.0]), np.array([aside]))[0].tolist()
+    driven = drive(route, 8.0, speed=speed, station=66.0, actors=[car(3, x, y, heading=heading + math.pi)])
+    farthest = math.tan(VehicleLimits().max_steering) / SHAPE.wheelbase
+    assert max(float(np.abs(plan.points[:, 6]).max()) for plan in driven.trajectories) < farthest + 0.02
+    assert driven.clearances.min() == driven.clearances[0]
+    assert driven.speeds[-1] > 5.0
+
+
+@pytest.mark.parametrize("speed", [2.0, 4.0])
+@pytest.mark.parametrize("gap", [6.5, 7.5])
+def test_the_next_one_is_not_passed_as_far_aside_before_the_ego_is_as_far_aside(gap: float, speed: float) -> None:
+    """As above, with another car behind the first one."""
+    route = road(curve_points(6.5, before=60.0) * [1.0, -1.0])
+    poses = route.line.poses(np.array([65.0, 65.0 + gap]), np.array([2.1, 2.4])).tolist()
+    cars = [car(3 + row, x, y, heading=heading + math.pi) for row, (x, y, heading) in enumerate(poses)]
+    driven = drive(route, 8.0, speed=speed, station=64.0, actors=cars)
+    farthest = math.tan(VehicleLimits().max_steering) / SHAPE.wheelbase
+    assert max(float(np.abs(plan.points[:, 6]).max()) for plan in driven.trajectories) < farthest + 0.02
+    assert driven.clearances.min() == driven.clearances[0]
+    assert driven.speeds[-1] > 5.0
 
 
 @pytest.mark.parametrize("station", [62.0, 68.0, 72.0])
