@@ -95,7 +95,6 @@ class NudgeDecider:
             room = blocker.low - self._shape.front
             latest = min(room + min(room, self._shape.front), latest)
         goes_by = situation.speed >= self._config.standing_speed and blocker.low < self._shape.front
-        is_unhurried = (is_clear or goes_by) and blocker.track not in self._held
         for offset in self._choices(blocker, situation):
             if self._meets_another(blocker, offset):
                 continue
@@ -107,8 +106,8 @@ class NudgeDecider:
             move = Move(situation.lateral, offset, 0.0, soonest.begin)
             roomy = roomy_length(move, situation.window, self._shape)
             begin = max(soonest.begin, min(roomy, latest))
-            if is_unhurried:
-                begin = max(begin, blend_length(offset - situation.lateral.offset, situation.speed, self._config))
+            if is_clear or goes_by:
+                begin = max(begin, self._unhurried(blocker.track, offset, situation))
             plateau = Plateau(begin, max(soonest.end, begin), offset)
             if roomy <= begin <= blocker.high:
                 return plateau
@@ -118,6 +117,12 @@ class NudgeDecider:
         if blocker.track in self._held and blocker.low < self._shape.front:
             return self._reached(blocker, self._held_offset(blocker.track), situation)
         return None if blocker.walks else min(late, key=lambda plateau: abs(plateau.offset), default=None)
+
+    def _unhurried(self, track: int, offset: float, situation: Situation) -> float:
+        """Where a comfortable move ends; for an object that the ego moves aside for already, where that move does."""
+        if track in self._held:
+            return self._held[track].begin - situation.window.station
+        return blend_length(offset - situation.lateral.offset, situation.speed, self._config)
 
     def _reached(self, blocker: Blocker, offset: float, situation: Situation) -> Plateau:
         """Where the offset can be reached and left. A move once begun later than that ends where it did before."""

@@ -16,6 +16,7 @@ from planned_drives import (
     curve_points,
     drive,
     person,
+    predicted,
     road,
     stop_line,
     sweeps,
@@ -25,6 +26,11 @@ from dvca_sumo.geometry.boxes import box_of, distances
 from dvca_sumo.messages import Floats, ObjectClass
 from dvca_sumo.roadmap.route import Control
 from dvca_sumo.stack.planning import PlanningConfig
+from dvca_sumo.stack.planning.moves import Lateral
+from dvca_sumo.stack.planning.nudging import NudgeDecider
+from dvca_sumo.stack.planning.reference import Reference
+from dvca_sumo.stack.planning.scene import scene_in
+from dvca_sumo.stack.planning.situation import Situation
 from dvca_sumo.world import VehicleLimits
 
 
@@ -474,6 +480,24 @@ def test_for_a_car_that_it_goes_by_already_in_a_bend_the_ego_does_not_turn_the_w
     assert max(float(np.abs(plan.points[:, 6]).max()) for plan in driven.trajectories) < farthest + 0.02
     assert driven.clearances.min() == driven.clearances[0]
     assert driven.speeds[-1] > 5.0
+
+
+@pytest.mark.parametrize("nearer", [0.3, 0.5])
+def test_a_move_for_one_that_it_goes_by_already_is_not_cut_short_when_that_one_seems_nearer(nearer: float) -> None:
+    """Though the offset changes."""
+    config, route = PlanningConfig(), road(curve_points(6.5, before=60.0) * [1.0, -1.0])
+    route = msgspec.structs.replace(route, lane_right=route.lane_right - 1.0, road_right=route.road_right - 1.0)
+    window, decider = Reference(route, SHAPE, config).window(63.0, 60.0), NudgeDecider(SHAPE, config)
+    begins = []
+    for cycle in range(40):
+        aside = 2.3 - (nearer if cycle >= 35 else 0.0)
+        x, y, heading = route.line.poses(np.array([66.0]), np.array([aside]))[0].tolist()
+        time, beside = 0.1 * cycle, car(3, x, y, heading=heading + math.pi)
+        scene = scene_in(window, predicted([beside], time), time, decider.stood, config)
+        nudges, _ = decider.step(Situation(time, 2.0, Lateral(0.0, 0.0, 0.0), window, scene, []))
+        begins += [nudge.plateau.begin for nudge in nudges]
+    assert begins
+    assert begins == [begins[0]] * len(begins)
 
 
 @pytest.mark.parametrize("speed", [2.0, 4.0])
