@@ -14,7 +14,7 @@ from dvca_sumo.messages import Floats, TrackedObjects, VehicleShape
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.lane_gaps import LAST_SPEED, Gaps, Neighbours
-from dvca_sumo.stack.planning.moves import blend_length
+from dvca_sumo.stack.planning.moves import Lateral, Move, blend_length, moved
 from dvca_sumo.stack.planning.reference import BEHIND, Window
 from dvca_sumo.stack.planning.speed import Stop
 
@@ -113,8 +113,9 @@ def keeping(
     if window.station < change.start_station:
         begin = int(stations.searchsorted(change.start_station))
         way = blend_length(max(change.widths), max(speed, LAST_SPEED), config)
-        share = np.minimum(np.maximum((stations - change.start_station) / way, 0.0), 1.0)
-        offsets *= share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        onto = Move(Lateral(0.0, 0.0, 0.0), 1.0, change.start_station, way)
+        (shares, _), _ = moved(onto, np.clip(stations - onto.begin, 0.0, way))
+        offsets *= shares
     return Keeping(offsets, begin, change.widths[lane], stop)
 
 

@@ -121,7 +121,7 @@ class NudgeDecider:
     def _unhurried(self, track: int, offset: float, situation: Situation) -> float:
         """Where a comfortable move ends; for an object that the ego moves aside for already, where that move does."""
         if track in self._held:
-            return self._held[track].begin - situation.window.station
+            return self._held_begin(track, situation)
         return blend_length(offset - situation.lateral.offset, situation.speed, self._config)
 
     def _reached(self, blocker: Blocker, offset: float, situation: Situation) -> Plateau:
@@ -129,7 +129,7 @@ class NudgeDecider:
         begin, end, _ = self._passed_at(blocker, offset)
         end += blocker.speed * end / max(situation.speed - blocker.speed, SLOWEST)
         if offset == self._held_offset(blocker.track):
-            begin = max(begin, self._held[blocker.track].begin - situation.window.station)
+            begin = max(begin, self._held_begin(blocker.track, situation))
         else:
             move = Move(situation.lateral, offset, 0.0, begin)
             begin = feasible_length(move, situation.speed, situation.window, self._config)
@@ -233,6 +233,10 @@ class NudgeDecider:
     def _held_offset(self, track: int) -> float:
         """The offset of the last cycle; 0 without one."""
         return self._held[track].offset if track in self._held else 0.0
+
+    def _held_begin(self, track: int, situation: Situation) -> float:
+        """Where the plateau of the last cycle begins, in this cycle's window [m]; there has to be one."""
+        return self._held[track].begin - situation.window.station
 
     def _clears(self, blocker: Blocker, offset: float) -> bool:
         return blocker.clearance(offset) >= self._config.nudge_clearance_least
