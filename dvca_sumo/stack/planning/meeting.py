@@ -59,7 +59,8 @@ class Meetings:
             for row, is_settled in zip(rows, settled.tolist(), strict=True)
             if not is_settled
         )
-        return [demand for demand in found if demand is not None]
+        demands = [demand for demand in found if demand is not None]
+        return [demand for demand in demands if not self._stops_in_way(demand, rows, graph, profile)]
 
     def _demand(self, row: int, graph: Graph, views: list[LineView], profile: Profile) -> Demand | None:
         config = self._config
@@ -82,6 +83,19 @@ class Meetings:
         if is_too_late and self._passes([row], graph, profile, 0.0)[0]:
             return None
         return Demand(row, stop, follows=self._joins(row, graph))
+
+    def _stops_in_way(self, demand: Demand, rows: list[int], graph: Graph, profile: Profile) -> bool:
+        """Whether the ego would stop for somebody's future in the way of a likelier one, which it now passes before."""
+        scene, row = graph.scene, demand.row
+        front = demand.stop.at + self._shape.front
+        likelier = [
+            other
+            for other in rows
+            if scene.owners[other] == scene.owners[row]
+            and scene.probabilities[other] > scene.probabilities[row]
+            and graph.low[other][graph.occupied[other]].min() < front
+        ]
+        return bool(likelier and self._passes(likelier, graph, profile, 0.0).any())
 
     def _beside(self, row: int, entry: float, graph: Graph, profile: Profile) -> float:
         """How far behind the front bumper somebody may come to the ego's way, at `entry` [s], and standing helps [m].

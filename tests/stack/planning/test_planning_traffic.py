@@ -665,6 +665,25 @@ def test_unlikely_future_is_ignored_and_a_likely_one_is_not() -> None:
     assert decisions == {0.1: "cruise", 0.5: "yield 3"}
 
 
+@pytest.mark.parametrize(("chance", "decision"), [(0.25, "cruise"), (0.75, "yield 3")])
+def test_for_an_unlikely_future_the_ego_does_not_stop_in_the_way_of_a_likely_one(chance: float, decision: str) -> None:
+    """Who sets off beside the road crosses right behind the ego, or turns to where the ego would be next."""
+    ways = 3.0 * PREDICTION_TIMES + PREDICTION_TIMES**2
+    poses = np.empty((2, len(PREDICTION_TIMES), 3))
+    for row, heading in enumerate((DOWN, math.atan2(-9.0, 6.0))):
+        places = np.column_stack((20.0 + ways * math.cos(heading), 9.0 + ways * math.sin(heading)))
+        poses[row] = np.column_stack((places, np.full(len(ways), heading)))
+    futures = msgspec.structs.replace(
+        predicted([car(3, 20.0, 9.0, heading=DOWN, speed=3.0)], 0.0),
+        owners=np.array([0, 0]),
+        probabilities=np.array([1.0 - chance, chance]),
+        poses=poses,
+        lanes=(("minor_0",), ("minor_0",)),
+    )
+    planner = Planner(PlanningConfig(), road(stop_lines=[stop_line(12.0, Control.PRIORITY)]), SHAPE)
+    assert planner.step(believed(14.0, speed=6.0), futures, {}).decision == decision
+
+
 def test_object_without_a_future_stays_where_it_is() -> None:
     unknown = msgspec.structs.replace(
         predicted([car(3, 30.0, speed=5.0)], 0.0),
