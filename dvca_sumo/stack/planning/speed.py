@@ -33,6 +33,7 @@ _TOUCH = 0.1  # [m] smallest distance divided by
 _ONCOMING = 2.0  # [s] later, the room is looked at that who comes towards the ego leaves
 _FAR = 200.0  # [m] beyond which there is no leader
 _HARDER = 1.3  # than the constant braking that would just match the leader's speed
+_SLOW = 5.0  # [m/s] no faster, an ego stops at once for who comes into its way beside its front
 _GENTLE_CLOSING = 2.0  # [m/s^2] of braking to match a leader's speed, up to which comfort is enough
 
 
@@ -151,7 +152,10 @@ def _for_stop(stop: Stop, s: float, v: float, time: float, config: PlanningConfi
 
 
 def _for_leader(gap: float, v: float, leader_speed: float, config: PlanningConfig) -> float:
-    """The intelligent driver model; harsher than comfort only where the gap would not last otherwise."""
+    """The intelligent driver model; harsher than comfort only where the gap would not last otherwise, or there is none.
+
+    There is none to who comes into the ego's way beside its front: faster or not, an ego that is slow lets it.
+    """
     if gap > _FAR:
         return config.acceleration
     if leader_speed < -_HOLD_SPEED:  # it comes towards the ego: what counts is the room there will be
@@ -159,6 +163,8 @@ def _for_leader(gap: float, v: float, leader_speed: float, config: PlanningConfi
     closing = v - leader_speed
     if v < _HOLD_SPEED and leader_speed < _HOLD_SPEED and gap < config.follow_gap + _HOLD_GAP:
         return _HOLD
+    if gap < 0.0 and v < _SLOW:
+        return -config.hard_braking
     wanted = v * config.headway + 0.5 * v * closing / math.sqrt(config.acceleration * config.braking)
     ratio = (config.follow_gap + wanted if wanted > 0.0 else config.follow_gap) / max(gap, _TOUCH)
     allowed = config.acceleration * (1.0 - ratio * ratio)

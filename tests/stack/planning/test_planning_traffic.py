@@ -61,6 +61,17 @@ def test_who_comes_onto_the_junction_aslant_and_does_not_wait_is_braked_for_at_o
     assert "yield 3" in driven.decisions
 
 
+@pytest.mark.parametrize(("y", "heading", "speed"), [(3.0, -0.3, 7.0), (3.4, -0.4, 7.0), (3.4, -0.5, 9.0)])
+def test_a_slow_ego_stops_at_once_for_who_comes_into_its_way_beside_its_front(
+    y: float, heading: float, speed: float
+) -> None:
+    """However fast it gets away: until its rear is past, the ego would drive into its side."""
+    joining = car(3, 23.0, y, heading=heading, speed=speed)
+    driven = drive(road(), 1.5, station=20.0, speed=3.5, actors=[joining])
+    assert driven.clearances.min() > 0.1
+    assert driven.speeds[-1] < 0.1
+
+
 def test_leader_that_stops_is_stopped_behind() -> None:
     driven = drive(road(), 30.0, speed=10.0, actors=[car(3, 45.0, speed=9.0, stays_from=8.0)])
     assert driven.speeds[-1] == 0.0
