@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgspec
+import numpy as np
 
 from dvca_sumo.messages import SignalColour, TrackedObjects, VehicleShape
 from dvca_sumo.roadmap.route import Control, Crossing, Route, StopLine
@@ -20,6 +21,10 @@ _ROLLING = 2.0  # [m/s] below this speed the ego always manages to stop at a red
 _NOBODY: frozenset[str] = frozenset()
 _BY_RULE = frozenset({Control.YIELD, Control.PRIORITY, Control.RIGHT_BEFORE_LEFT})
 _GREENS = (SignalColour.GREEN, SignalColour.PERMISSIVE)
+_SWUNG = 1.0  # [m] that a line leads aside to turn back, from which on who stands there is across the next lane
+_STRAIGHT = 0.1  # [m] of the rear axle beside the middle of its lane, with which the body is in it
+_SWING = 25.0  # [m] before a line, within which one swings out to turn back
+_ON_YELLOW = 2.0  # [s] to the line, for which yellow lasts: who has swung out goes on
 _MERGE_REACH = 10.0  # [m] past the junction, where traffic from other approaches still joins
 
 
@@ -29,6 +34,7 @@ class LineView(NamedTuple):
     line: StopLine
     distance: float  # [m] from the front bumper
     gap: float  # [m] that the ego keeps before it, at least
+    place: float  # [m] from the front bumper to where the ego stands for it
     stop: str | None  # why the ego must not cross it, if it must not
     goes_first: frozenset[str]  # lanes whose traffic has priority
     waiting_distance: float  # [m] from the front bumper to where it is let pass
@@ -52,6 +58,7 @@ class Junctions:
         self._lines = _with_room_between(route.stop_lines, shape.length)
         self._exits = [line.exit_station for line in self._lines]
         self._gaps = [_gap(line, route.crossings, config) for line in self._lines]
+        self._swings = [_swing(line, route, shape) for line in self._lines]
         self._seen: dict[str, tuple[float, SignalColour]] = {}
         self._entered: set[int] = set()  # lines crossed on yellow, for which it was too late to stop
         self._kept: set[int] = set()  # lines that it has begun to stop at on yellow or red
@@ -87,16 +94,25 @@ class Junctions:
 
     def _view(self, index: int, distance: float, time: float, speed: float) -> LineView:
         line, gap = self._lines[index], self._gaps[index]
-        waiting_distance = distance - gap
+        place = waiting_distance = distance - gap
         if line.control is Control.SIGNAL:
             stop, goes_first = self._at_signal(index, distance, time, speed)
-            if line.waiting_station is not None and self._colour(line.signal_id or "", time) in _GREENS:
+            colour = self._colour(line.signal_id or "", time)
+            if colour is not None and not self._is_swinging(index, distance):
+                place = min(place, distance - self._swings[index])
+            if line.waiting_station is not None and colour in _GREENS:
                 waiting_distance = distance + line.waiting_station - line.station
         else:
             stop, goes_first = None, line.yields_to
             if line.control in (Control.STOP, Control.ALL_WAY_STOP) and index not in self._released:
                 stop = self._at_sign(index, time)
-        return LineView(line, distance, gap, stop if distance > -_OVERRUN else None, goes_first, waiting_distance)
+        return LineView(
+            line, distance, gap, place, stop if distance > -_OVERRUN else None, goes_first, waiting_distance
+        )
+
+    def _is_swinging(self, index: int, distance: float) -> bool:
+        """Whether the ego, so far before a line [m], has left its lane to turn back at it."""
+        return 0.0 < distance < self._swings[index] - _OVERRUN
 
     def _at_sign(self, index: int, time: float) -> str | None:
         """Whether to stand on: for a while, and for those who were there first."""
@@ -115,7 +131,8 @@ class Junctions:
         colour = self._colour(signal, time)
         needed = speed * speed / (2.0 * max(distance, 0.1))
         most = self._config.hard_braking if index in self._kept else self._config.yellow_braking
-        if colour is SignalColour.YELLOW and needed > most:
+        is_in_way = self._is_swinging(index, distance) and distance < _ON_YELLOW * speed
+        if colour is SignalColour.YELLOW and (needed > most or is_in_way):
             self._entered.add(index)
         elif distance > 0.0 and needed < self._config.comfort_braking:
             self._entered.discard(index)  # somebody else has made it slow down
@@ -158,6 +175,18 @@ def _gap(line: StopLine, crossings: Sequence[Crossing], config: PlanningConfig) 
     ahead = (crossing for crossing in crossings if crossing.end_station > line.station)
     behind = (max(crossing.start_station - line.station, 0.0) for crossing in ahead)
     return max(config.stop_line_gap, config.crossing_gap - min(behind, default=config.crossing_gap))
+
+
+def _swing(line: StopLine, route: Route, shape: VehicleShape) -> float:
+    """How far before a line the front is where the ego leaves its lane, to turn back there [m]; 0 where it does not."""
+    stations = route.line.stations
+    rows = np.flatnonzero((stations > line.station - _SWING) & (stations < line.station))
+    aside = np.abs(0.5 * (route.lane_left[rows] + route.lane_right[rows]))
+    if line.direction not in "tT" or aside.max(initial=0.0) < _SWUNG:
+        return 0.0
+    straight = np.flatnonzero(aside[: int(aside.argmax())] <= _STRAIGHT)
+    begin = float(stations[rows[straight[-1] if len(straight) else 0]])
+    return max(line.station - begin - shape.front, 0.0)
 
 
 def _with_room_between(lines: Sequence[StopLine], length: float) -> list[StopLine]:

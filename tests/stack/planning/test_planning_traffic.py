@@ -21,7 +21,7 @@ from planned_drives import (
 )
 
 from dvca_sumo.messages import PREDICTION_TIMES, SignalColour
-from dvca_sumo.roadmap.route import Control, Crossing, Overpass
+from dvca_sumo.roadmap.route import Control, Crossing, Overpass, Route
 from dvca_sumo.stack.planning import Planner, PlanningConfig
 
 UP, DOWN = math.pi / 2.0, -math.pi / 2.0
@@ -574,6 +574,46 @@ def test_who_was_late_for_yellow_and_then_has_to_stop_before_the_line_waits_ther
     stopped = driven(person(5, 116.0, -3.0, heading=UP, speed=1.4, leaves=6.8))
     assert stopped.fronts[-1] < 120.0
     assert stopped.clearances.min() > 0.2
+
+
+def swinging_out(station: float) -> Route:
+    """A road whose line leads 4 m out of its lane within the last 20 m before a light, to turn back there."""
+    route = road(stop_lines=[stop_line(station, Control.SIGNAL, direction="t", yields_to=frozenset())])
+    ahead = np.interp(route.line.stations, [station - 20.0, station - 10.0, station], [0.0, 4.0, 0.0])
+    return msgspec.structs.replace(
+        route, lane_left=np.maximum(1.6 + ahead, 0.1), lane_right=np.minimum(-1.6 + ahead, -0.1)
+    )
+
+
+def test_who_has_to_stop_at_a_light_does_not_swing_out_before_to_turn_back() -> None:
+    """It would stand across the next lane."""
+    driven = drive(swinging_out(100.0), 25.0, speed=10.0, signals=lambda _: {"J/2": SignalColour.RED})
+    assert driven.speeds[-1] == 0.0
+    assert 80.0 - 1.0 < driven.states[-1, 1] < 80.0 + 0.5
+    assert_drivable(driven)
+
+
+def test_when_it_is_green_it_goes_on_to_the_line() -> None:
+    def signals(time: float) -> dict[str, SignalColour]:
+        return {"J/2": SignalColour.RED if time < 20.0 else SignalColour.GREEN}
+
+    driven = drive(swinging_out(100.0), 30.0, speed=10.0, signals=signals)
+    assert driven.fronts[-1] > 100.0
+
+
+def test_a_light_that_nobody_sees_is_passed_after_a_stop_at_its_line() -> None:
+    assert drive(swinging_out(100.0), 40.0, speed=10.0).fronts[-1] > 100.0
+
+
+@pytest.mark.parametrize(("station", "passes"), [(91.0, True), (82.0, False)])
+def test_who_has_swung_out_goes_on_at_yellow_where_it_comes_to_the_line_in_time(
+    station: float, *, passes: bool
+) -> None:
+    def signals(time: float) -> dict[str, SignalColour]:
+        return {"J/2": SignalColour.YELLOW if time < 1.0 else SignalColour.RED}
+
+    driven = drive(swinging_out(100.0), 8.0, station=station, speed=3.0, signals=signals)
+    assert (driven.fronts[-1] > 100.0) == passes
 
 
 def test_junction_is_not_entered_while_a_person_stands_in_the_way_on_it() -> None:
