@@ -4,6 +4,8 @@ import msgspec
 
 from dvca_sumo.geometry.polyline import Polyline
 
+TURNS_BACK = ("t", "T")  # directions of movements, by SUMO's letters
+
 
 class RoadMapError(ValueError):
     """The net cannot be used; says in one line which file and why."""

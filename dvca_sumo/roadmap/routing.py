@@ -12,7 +12,7 @@ from dvca_sumo.roadmap.corners import off_corners
 from dvca_sumo.roadmap.drawing import Change, Drawing, Stretch
 from dvca_sumo.roadmap.extending import extended
 from dvca_sumo.roadmap.lane_sequence import Leg, change_length, lane_sequence
-from dvca_sumo.roadmap.lanes import Lane, Movement
+from dvca_sumo.roadmap.lanes import TURNS_BACK, Lane, Movement
 from dvca_sumo.roadmap.passing import Way, passing_lanes
 from dvca_sumo.roadmap.reading import NetContents
 from dvca_sumo.roadmap.right_of_way import crossings, stop_line
@@ -154,7 +154,7 @@ def _continued(net: NetContents, legs: Sequence[Leg], distance: float) -> Iterat
     yield from legs[:-1]
     leg = legs[-1]
     while distance > 0.0:
-        ahead = [m for m in net.movements.get(leg.exit.id, ()) if m.is_drivable and m.direction not in "tT"]
+        ahead = [m for m in net.movements.get(leg.exit.id, ()) if m.is_drivable and m.direction not in TURNS_BACK]
         if not ahead:
             break
         movement = min(ahead, key=lambda m: m.direction != "s")

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.messages import SignalColour, TrackedObjects, VehicleShape
+from dvca_sumo.roadmap.lanes import TURNS_BACK
 from dvca_sumo.roadmap.route import Control, Crossing, Route, StopLine
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.watching import WatchList
@@ -34,7 +35,7 @@ class LineView(NamedTuple):
     line: StopLine
     distance: float  # [m] from the front bumper
     gap: float  # [m] that the ego keeps before it, at least
-    place: float  # [m] from the front bumper to where the ego stands for it
+    standing_distance: float  # [m] from the front bumper to where it stands for it
     stop: str | None  # why the ego must not cross it, if it must not
     goes_first: frozenset[str]  # lanes whose traffic has priority
     waiting_distance: float  # [m] from the front bumper to where it is let pass
@@ -94,21 +95,20 @@ class Junctions:
 
     def _view(self, index: int, distance: float, time: float, speed: float) -> LineView:
         line, gap = self._lines[index], self._gaps[index]
-        place = waiting_distance = distance - gap
+        standing_distance = waiting_distance = distance - gap
         if line.control is Control.SIGNAL:
             stop, goes_first = self._at_signal(index, distance, time, speed)
             colour = self._colour(line.signal_id or "", time)
             if colour is not None and not self._is_swinging(index, distance):
-                place = min(place, distance - self._swings[index])
+                standing_distance = min(standing_distance, distance - self._swings[index])
             if line.waiting_station is not None and colour in _GREENS:
                 waiting_distance = distance + line.waiting_station - line.station
         else:
             stop, goes_first = None, line.yields_to
             if line.control in (Control.STOP, Control.ALL_WAY_STOP) and index not in self._released:
                 stop = self._at_sign(index, time)
-        return LineView(
-            line, distance, gap, place, stop if distance > -_OVERRUN else None, goes_first, waiting_distance
-        )
+        stop = stop if distance > -_OVERRUN else None
+        return LineView(line, distance, gap, standing_distance, stop, goes_first, waiting_distance)
 
     def _is_swinging(self, index: int, distance: float) -> bool:
         """Whether the ego, so far before a line [m], has left its lane to turn back at it."""
@@ -179,10 +179,12 @@ def _gap(line: StopLine, crossings: Sequence[Crossing], config: PlanningConfig) 
 
 def _swing(line: StopLine, route: Route, shape: VehicleShape) -> float:
     """How far before a line the front is where the ego leaves its lane, to turn back there [m]; 0 where it does not."""
+    if line.direction not in TURNS_BACK:
+        return 0.0
     stations = route.line.stations
     rows = np.flatnonzero((stations > line.station - _SWING) & (stations < line.station))
     aside = np.abs(0.5 * (route.lane_left[rows] + route.lane_right[rows]))
-    if line.direction not in "tT" or aside.max(initial=0.0) < _SWUNG:
+    if aside.max(initial=0.0) < _SWUNG:
         return 0.0
     straight = np.flatnonzero(aside[: int(aside.argmax())] <= _STRAIGHT)
     begin = float(stations[rows[straight[-1] if len(straight) else 0]])

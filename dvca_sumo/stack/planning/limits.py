@@ -214,7 +214,7 @@ def _closing_up(usual: float, views: list[LineView], shape: VehicleShape, config
 
 
 def _at_line(view: LineView, label: str) -> Stop:
-    return Stop(view.place, view.gap, label)
+    return Stop(view.standing_distance, view.gap, label)
 
 
 def _obstacle(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> int | None:
