@@ -10,6 +10,7 @@ from dvca_sumo.roadmap import Route
 from dvca_sumo.truth import EgoTruth
 from dvca_sumo.world.entry import Entry, departure
 from dvca_sumo.world.session import Motion
+from dvca_sumo.world.straddling import SLOW
 from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
 
 _SEARCHED = 10.0  # [m] along the route: nobody gets farther in a world step, and a route may come by again soon
@@ -56,6 +57,13 @@ class Ego:
         nose = (truth.x + reach * math.cos(truth.heading), truth.y + reach * math.sin(truth.heading))
         _, offset = line.place(*nose, between=(front - reach, front + reach))
         return self.route.lane_at(front, offset)
+
+    def straddled(self, lane: str) -> tuple[str, ...]:
+        """The route's lanes of roads beside which an ego may be that is slow: its front is on `lane`."""
+        if self.truth.speed > SLOW:
+            return ()
+        rear = self.route.lane_ids[self.route.row_at(self.station())]
+        return tuple(name for name in dict.fromkeys((lane, rear)) if not name.startswith(":"))
 
     def occupied(self) -> float:
         """How much lane it takes up [m]: more than its length where it cuts the corner that the lanes drive out."""

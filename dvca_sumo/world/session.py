@@ -19,7 +19,7 @@ import numpy as np
 import shapely
 import traci.constants as tc
 
-from dvca_sumo.messages import ObjectClass, SignalColour
+from dvca_sumo.messages import ObjectClass, SignalColour, VehicleShape
 from dvca_sumo.roadmap.areas import Shape, Strip
 from dvca_sumo.scenario import Scenario, ScenarioError, input_words
 from dvca_sumo.truth import EgoTruth, ObjectsTruth
@@ -32,9 +32,11 @@ from dvca_sumo.world.lingering import Lingering
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 from dvca_sumo.world.setback import Setback
 from dvca_sumo.world.signals import Signals
+from dvca_sumo.world.straddling import outline, taken
 
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
 NEVER_TELEPORTED = "dvca.ego"  # vehicle type of an adopted ego
+SHADOW = "dvca.shadow"  # vehicle type of what stands for an ego on a second lane
 
 # What is asked of who is near tells of which kind they are: the answers for both arrive in one dictionary, by id.
 _VEHICLE, _PERSON = tc.VAR_SPEED, tc.VAR_ANGLE
@@ -95,6 +97,7 @@ class _Adopted(msgspec.Struct):
     fastest: float  # [m/s] that it can drive
     length: float  # [m] of lane that it takes up
     goes: bool = True  # means to, when it can
+    shadows: tuple[str, ...] = ()  # lanes on which one stands for it
 
 
 class Session:
@@ -109,7 +112,10 @@ class Session:
         if libsumo.isLoaded():
             raise ScenarioError("a simulation is already loaded in this process")
         types = folder / "ego.add.xml"
-        types.write_text(f'<additional><vType id="{NEVER_TELEPORTED}" timeToTeleport="-1"/></additional>')
+        types.write_text(
+            f'<additional><vType id="{NEVER_TELEPORTED}" timeToTeleport="-1"/>'
+            f'<vType id="{SHADOW}" vClass="ignoring" timeToTeleport="-1"/></additional>'
+        )
         files = input_words(scenario.configuration, folder, types)
         try:
             libsumo.start(["sumo", *scenario.arguments, *files])
@@ -122,6 +128,8 @@ class Session:
         self._footing = Footing(self._walking_area)
         self._inner: dict[str, list[Strip]] = {}  # lanes of vehicles on junctions
         self._adopted: dict[str, _Adopted] = {}  # by ego
+        self._shadowed: set[str] = set()  # edges
+        self._has_sublanes = float(libsumo.simulation.getOption("lateral-resolution")) > 0.0
         self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
 
@@ -150,7 +158,7 @@ class Session:
 
     def departed(self) -> tuple[str, ...]:
         """Vehicles inserted in the last step."""
-        return tuple(libsumo.simulation.getDepartedIDList())
+        return tuple(name for name in libsumo.simulation.getDepartedIDList() if not _is_shadow(name))
 
     def arrived(self) -> tuple[str, ...]:
         """Vehicles that came to the end of their trips in the last step."""
@@ -209,7 +217,7 @@ class Session:
     def waits(self) -> dict[str, float]:
         """How long each vehicle that SUMO drives has stood [s]; 0 while it makes a stop of its own."""
         of = libsumo.vehicle
-        names = (name for name in of.getIDList() if name not in self._adopted)
+        names = (name for name in of.getIDList() if name not in self._adopted and not _is_shadow(name))
         return {name: 0.0 if of.isStopped(name) else float(of.getWaitingTime(name)) for name in names}
 
     def motion(self, vehicle: str) -> Motion:
@@ -260,13 +268,16 @@ class Session:
         of.subscribeContext(vehicle, tc.CMD_GET_VEHICLE_VARIABLE, radius, (_VEHICLE,))
         of.subscribeContext(vehicle, tc.CMD_GET_PERSON_VARIABLE, radius, (_PERSON,))
 
-    def remove(self, vehicle: str) -> None:
-        """Take a vehicle out of the simulation."""
-        del self._crowds[vehicle], self._adopted[vehicle]
+    def remove(self, ego: str) -> None:
+        """Take an ego out of the simulation, if SUMO has not done so."""
         of = libsumo.vehicle
-        for kind in (tc.CMD_GET_VEHICLE_VARIABLE, tc.CMD_GET_PERSON_VARIABLE):
-            of.unsubscribeContext(vehicle, kind, 0.0)  # else SUMO gives up at the next step
-        of.remove(vehicle)
+        for lane in self._adopted[ego].shadows:
+            self._take_away(_shadow(ego, lane))
+        del self._crowds[ego], self._adopted[ego]
+        if self.has(ego):
+            for kind in (tc.CMD_GET_VEHICLE_VARIABLE, tc.CMD_GET_PERSON_VARIABLE):
+                of.unsubscribeContext(ego, kind, 0.0)  # else SUMO gives up at the next step
+            of.remove(ego)
 
     def place(self, ego: str, truth: EgoTruth, front: float, lane: str, indicated: int) -> None:
         """Put the ego where its own dynamics say; effective with the next step.
@@ -296,6 +307,68 @@ class Session:
         # SUMO's own would tell what its driver, overruled, meant to do.
         libsumo.vehicle.setSignals(ego, _INDICATORS[indicated] | (_BRAKE_LIGHT if _is_braking(truth) else 0))
         self._announce(ego, truth.speed)
+
+    def straddle(self, ego: str, truth: EgoTruth, shape: VehicleShape, lanes: Sequence[str]) -> None:
+        """Tell SUMO on which lanes an ego is besides; effective with the next step.
+
+        There a shadow stands for it, a vehicle that nobody sees but SUMO's drivers. The sub-lane model needs none.
+
+        Args:
+            ego: The vehicle.
+            truth: How it moves now.
+            shape: Its body.
+            lanes: Of the route, that its ends are on; none: it is on no second one.
+        """
+        adopted = self._adopted[ego]
+        parts = self._straddled(ego, outline(truth, shape), lanes) if lanes and not self._has_sublanes else {}
+        for lane in adopted.shadows:
+            if lane not in parts:
+                self._take_away(_shadow(ego, lane))
+        for lane, (begin, end) in parts.items():
+            self._cast(_shadow(ego, lane), lane, begin, end)
+            libsumo.vehicle.setPreviousSpeed(_shadow(ego, lane), truth.speed, truth.acceleration)
+        adopted.shadows = tuple(parts)
+
+    def _cast(self, shadow: str, lane: str, begin: float, end: float) -> None:
+        """Have a shadow on a lane from `begin` to `end` [m]."""
+        of, (edge, _, index) = libsumo.vehicle, lane.rpartition("_")
+        if not self.has(shadow):
+            if edge not in self._shadowed:
+                self._shadowed.add(edge)
+                libsumo.route.add(f"{SHADOW}.{edge}", [edge])
+            of.add(shadow, f"{SHADOW}.{edge}", SHADOW)
+        middle, _ = self._middle(lane)
+        front, behind = middle.interpolate(end), middle.interpolate(begin)
+        angle = math.degrees(math.atan2(front.x - behind.x, front.y - behind.y))
+        of.setLength(shadow, end - begin)
+        of.moveToXY(shadow, edge, int(index), front.x, front.y, angle, keepRoute=2, matchThreshold=_MATCHED_WITHIN)
+
+    def _take_away(self, shadow: str) -> None:
+        if self.has(shadow):
+            libsumo.vehicle.remove(shadow)
+
+    def _straddled(self, ego: str, body: shapely.Polygon, lanes: Sequence[str]) -> dict[str, tuple[float, float]]:
+        """Lanes that an ego is on, beside where SUMO has found it, and from where to where [m]."""
+        found, parts = libsumo.vehicle.getLaneID(ego), {}
+        for lane in lanes:
+            edge, _, text = lane.rpartition("_")
+            index, count = int(text), libsumo.edge.getLaneNumber(edge)
+            beside = [f"{edge}_{near}" for near in (index - 1, index + 1) if 0 <= near < count]
+            if found in beside:
+                beside = [*(name for name in beside if name != found), lane]
+            for name in beside:
+                middle, width = self._middle(name)
+                part = taken(body, middle, width)
+                if part is not None and not self._is_there(name, *part, ego):
+                    parts[name] = part
+        return parts
+
+    def _is_there(self, lane: str, begin: float, end: float, ego: str) -> bool:
+        """Whether somebody is on that part of a lane already: who is stopped beside an ego must not stay for ever."""
+        of, shadow = libsumo.vehicle, _shadow(ego, lane)
+        others = (name for name in libsumo.lane.getLastStepVehicleIDs(lane) if name not in (ego, shadow))
+        fronts = ((of.getLanePosition(name), of.getLength(name)) for name in others)
+        return any(begin < front and front - length < end for front, length in fronts)
 
     def _announce(self, ego: str, speed: float) -> None:
         """Tell SUMO whether an ego at `speed` [m/s] means to go on: nobody waits for one that does not."""
@@ -399,7 +472,7 @@ class Session:
     def _vehicle_now(self, name: str) -> tuple[_Seen, ...]:
         of = libsumo.vehicle
         x, y = of.getPosition(name)
-        if abs(x) >= _NOWHERE:
+        if abs(x) >= _NOWHERE or _is_shadow(name):
             return ()
         lane = sys.intern(of.getLaneID(name))  # met again in thousands of moments
         return (_Seen(self._vehicle(name), (x, y, of.getAngle(name), of.getSpeed(name)), lane, ""),)
@@ -427,6 +500,15 @@ class Session:
             of = libsumo.person
             self._bodies[key] = Body(ObjectClass.PEDESTRIAN, of.getLength(name), of.getWidth(name), 0.0)
         return key
+
+
+def _shadow(ego: str, lane: str) -> str:
+    """The name of an ego's shadow on a lane."""
+    return f"{SHADOW}.{lane}.{ego}"
+
+
+def _is_shadow(name: str) -> bool:
+    return name.startswith(f"{SHADOW}.")
 
 
 def _has_red(vehicle: str) -> bool:

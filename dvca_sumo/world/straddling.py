@@ -1,0 +1,34 @@
+"""How much of a lane a body takes up that is beside the one SUMO has it on.
+
+SUMO has a vehicle on one lane. Its drivers on another one do not see a car that stands across both, half-way through
+turning back or between two lanes of a queue, and drive into its side.
+"""
+
+import math
+
+import shapely
+
+from dvca_sumo.geometry.boxes import box_of, corners
+from dvca_sumo.messages import VehicleShape
+from dvca_sumo.truth import EgoTruth
+
+SLOW = 5.0  # [m/s] above, an ego is on its way from one lane to the other, and soon on one
+_REACH = 0.4  # [m] into a lane: up to that, a car in its middle has room to pass
+_SHORTEST = 0.1  # [m]
+
+
+def outline(truth: EgoTruth, shape: VehicleShape) -> shapely.Polygon:
+    """Where an ego's body is."""
+    return shapely.Polygon(corners(box_of(truth.x, truth.y, truth.heading, shape)[None])[0])
+
+
+def taken(body: shapely.Polygon, middle: shapely.LineString, width: float) -> tuple[float, float] | None:
+    """From where to where a body is in the way on a lane of `width` [m], along its centre line [m]; None: it is not."""
+    reach = max(0.5 * width - _REACH, 0.0)
+    if body.distance(middle) >= reach:
+        return None
+    way = middle.buffer(reach, cap_style="flat", join_style="mitre")
+    corners = shapely.points(shapely.get_coordinates(way.intersection(body)))
+    stations = shapely.line_locate_point(middle, corners)
+    begin, end = float(stations.min(initial=math.inf)), float(stations.max(initial=0.0))
+    return (begin, end) if end - begin > _SHORTEST else None

@@ -1,0 +1,140 @@
+"""An ego that stands across two lanes is in the way of both, and nobody but SUMO's drivers sees how they are told."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import shapely
+from small_scenarios import in_child, scenario_file
+from watched_world import STEP
+
+from dvca_sumo.geometry.boxes import box_of, distances
+from dvca_sumo.messages import ControlCommand, PoseStep
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.scenario import load_scenario
+from dvca_sumo.world import VehicleLimits, World
+from dvca_sumo.world.straddling import taken
+
+NODES = '<node id="b" x="0" y="0"/><node id="c" x="300" y="0"/>'
+EDGES = '<edge id="bc" from="b" to="c" speed="13.9" numLanes="2"/>'
+EGO = '<trip id="ego" from="bc" to="bc" depart="0" departPos="100" departSpeed="0" departLane="0"/>'
+FROM_BEHIND = '<trip id="other" from="bc" to="bc" depart="5" departPos="0" departSpeed="max" departLane="{}"/>'
+BESIDE = '<trip id="other" from="bc" to="bc" depart="1" departPos="98" departSpeed="0" departLane="1"/>'
+OUT, BACK = 15, 250  # steps after which it stands across the lanes, and goes back to its own
+ASIDE = 1.5  # [m]
+
+
+class Drive:
+    """An ego that moves out over the edge of its lane, stands there, and moves back."""
+
+    def __init__(self, folder: Path, net: Path, traffic: str, **options: str) -> None:
+        scenario = load_scenario(scenario_file(folder, net, EGO + traffic, **options), "ego")
+        self.world = World(scenario, folder)
+        entry = self.world.await_ego((), lambda _: True)
+        route = RoadMap.load(net).route(entry.edges, entry.lane, entry.position, None, 300.0)
+        self.ego = self.world.adopt(entry, route, VehicleLimits())
+        self.gaps: list[float] = []
+        self.names: set[str] = set()
+
+    def go(self, steps: int) -> None:
+        """So many steps on."""
+        for step in range(len(self.gaps), len(self.gaps) + steps):
+            left = ASIDE / OUT * ((step < OUT) - (BACK <= step < BACK + OUT))
+            move = PoseStep(0.1 * (left != 0.0), left, 0.0, 0.0)
+            self.ego.vehicle.advance(ControlCommand(self.world.time, 0.0, 0.0, move), STEP)
+            self.world.advance()
+            objects, truth = self.world.observe(self.ego).objects, self.ego.truth
+            own = box_of(truth.x, truth.y, truth.heading, self.ego.shape)
+            self.gaps.append(float(distances(own, objects.boxes).min(initial=math.inf)))
+            self.names |= {*objects.ids, *self.world.departed(), *self.world.waits()}
+
+
+@pytest.mark.parametrize("lane", [0, 1])
+def test_who_comes_on_either_lane_stops_behind_an_ego_across_both_until_it_is_out_of_the_way(
+    tmp_path: Path, plain_file: Callable[..., Path], lane: int
+) -> None:
+    net = plain_file(NODES, EDGES)
+
+    def job() -> tuple[list[float], set[str], tuple[str, ...]]:
+        drive = Drive(tmp_path, net, FROM_BEHIND.format(lane))
+        drive.go(BACK + 200)
+        return drive.gaps, drive.names, drive.world.arrived()
+
+    gaps, names, _ = in_child(job)
+    assert 0.5 < min(gaps[:BACK]) < 5.0
+    assert gaps[BACK - 1] == min(gaps[:BACK])
+    assert gaps[-1] > 20.0  # on the free lane it has passed
+    assert names == {"other"}
+
+
+@pytest.mark.parametrize("end", ["of its trip", "by SUMO"])
+def test_nothing_of_an_ego_stays_on_the_road_without_it(
+    tmp_path: Path, plain_file: Callable[..., Path], end: str
+) -> None:
+    net = plain_file(NODES, EDGES)
+
+    def job() -> tuple[int, tuple[str, ...]]:
+        import libsumo  # noqa: PLC0415 one simulation a process: never in the tests' own
+
+        drive = Drive(tmp_path, net, FROM_BEHIND.format(1))
+        drive.go(50)
+        before = libsumo.vehicle.getIDCount()
+        if end == "of its trip":
+            drive.world.dismiss(drive.ego)
+        else:
+            step = libsumo.simulationStep
+
+            def take_off() -> None:
+                for kind in (libsumo.constants.CMD_GET_VEHICLE_VARIABLE, libsumo.constants.CMD_GET_PERSON_VARIABLE):
+                    libsumo.vehicle.unsubscribeContext("ego", kind, 0.0)
+                libsumo.vehicle.remove("ego")
+                step()
+
+            libsumo.simulationStep = take_off
+        drive.world.advance()
+        return before, libsumo.vehicle.getIDList()
+
+    assert in_child(job) == (3, ("other",))
+
+
+def test_who_is_already_beside_it_drives_on(tmp_path: Path, plain_file: Callable[..., Path]) -> None:
+    net = plain_file(NODES, EDGES)
+
+    def job() -> list[float]:
+        drive = Drive(tmp_path, net, BESIDE)
+        drive.go(BACK)
+        return drive.gaps
+
+    assert in_child(job)[-1] == math.inf  # out of sight
+
+
+def test_the_sub_lane_model_needs_nothing_more(tmp_path: Path, plain_file: Callable[..., Path]) -> None:
+    net = plain_file(NODES, EDGES)
+
+    def job() -> tuple[int, list[float]]:
+        import libsumo  # noqa: PLC0415 one simulation a process: never in the tests' own
+
+        drive = Drive(tmp_path, net, FROM_BEHIND.format(1), lateral_resolution="0.8")
+        drive.go(100)
+        return libsumo.vehicle.getIDCount(), drive.gaps
+
+    count, gaps = in_child(job)
+    assert count == 2
+    assert min(gaps) > 0.2
+
+
+@pytest.mark.parametrize(
+    ("low", "expected"),
+    [(1.0, (10.0, 15.0)), (1.7, None), (-1.0, (10.0, 15.0)), (-3.0, (10.0, 15.0)), (-3.5, None)],
+)
+def test_a_body_is_in_the_way_that_leaves_a_car_no_room_to_pass(low: float, expected: Any) -> None:
+    middle, body = shapely.LineString([(0.0, 0.0), (100.0, 0.0)]), shapely.box(10.0, low, 15.0, low + 1.8)
+    assert taken(body, middle, 3.2) == (expected and pytest.approx(expected))
+
+
+def test_a_body_beyond_the_end_of_a_lane_is_not_in_its_way() -> None:
+    middle = shapely.LineString([(0.0, 0.0), (100.0, 0.0)])
+    assert taken(shapely.box(100.5, -0.9, 105.5, 0.9), middle, 3.2) is None
+    assert taken(shapely.box(98.0, -0.9, 103.0, 0.9), middle, 3.2) == pytest.approx((98.0, 100.0))
