@@ -338,7 +338,7 @@ class Session:
                 libsumo.route.add(f"{SHADOW}.{edge}", [edge])
             of.add(shadow, f"{SHADOW}.{edge}", SHADOW)
         middle, _ = self._middle(lane)
-        front, behind = middle.interpolate(end), middle.interpolate(begin)
+        front, behind = middle.interpolate(end), middle.interpolate(max(begin, 0.0))
         angle = math.degrees(math.atan2(front.x - behind.x, front.y - behind.y))
         of.setLength(shadow, end - begin)
         of.moveToXY(shadow, edge, int(index), front.x, front.y, angle, keepRoute=2, matchThreshold=_MATCHED_WITHIN)

@@ -23,12 +23,20 @@ def outline(truth: EgoTruth, shape: VehicleShape) -> shapely.Polygon:
 
 
 def taken(body: shapely.Polygon, middle: shapely.LineString, width: float) -> tuple[float, float] | None:
-    """From where to where a body is in the way on a lane of `width` [m], along its centre line [m]; None: it is not."""
+    """From where to where a body is in the way on a lane of `width` [m], along its centre line [m]; None: it is not.
+
+    A body that is on what comes before the lane, too, begins at less than 0: as far back as it reaches.
+    """
     reach = max(0.5 * width - _REACH, 0.0)
     if body.distance(middle) >= reach:
         return None
     way = middle.buffer(reach, cap_style="flat", join_style="mitre")
-    corners = shapely.points(shapely.get_coordinates(way.intersection(body)))
-    stations = shapely.line_locate_point(middle, corners)
+    stations = shapely.line_locate_point(middle, shapely.points(shapely.get_coordinates(way.intersection(body))))
     begin, end = float(stations.min(initial=math.inf)), float(stations.max(initial=0.0))
-    return (begin, end) if end - begin > _SHORTEST else None
+    if end - begin <= _SHORTEST:
+        return None
+    if begin > _SHORTEST:
+        return begin, end
+    origin, ahead = shapely.get_coordinates(shapely.line_interpolate_point(middle, (0.0, end)))
+    along = (shapely.get_coordinates(body) - origin) @ (ahead - origin) / math.dist(ahead, origin)
+    return min(begin, float(along.min())), end

@@ -19,7 +19,7 @@ from dvca_sumo.world.straddling import taken
 
 NODES = '<node id="b" x="0" y="0"/><node id="c" x="300" y="0"/>'
 EDGES = '<edge id="bc" from="b" to="c" speed="13.9" numLanes="2"/>'
-EGO = '<trip id="ego" from="bc" to="bc" depart="0" departPos="100" departSpeed="0" departLane="0"/>'
+EGO = '<trip id="ego" from="bc" to="bc" depart="0" departPos="{}" departSpeed="0" departLane="0"/>'
 FROM_BEHIND = '<trip id="other" from="bc" to="bc" depart="5" departPos="0" departSpeed="max" departLane="{}"/>'
 BESIDE = '<trip id="other" from="bc" to="bc" depart="1" departPos="98" departSpeed="0" departLane="1"/>'
 OUT, BACK = 15, 250  # steps after which it stands across the lanes, and goes back to its own
@@ -29,8 +29,8 @@ ASIDE = 1.5  # [m]
 class Drive:
     """An ego that moves out over the edge of its lane, stands there, and moves back."""
 
-    def __init__(self, folder: Path, net: Path, traffic: str, **options: str) -> None:
-        scenario = load_scenario(scenario_file(folder, net, EGO + traffic, **options), "ego")
+    def __init__(self, folder: Path, net: Path, traffic: str, position: float = 100.0, **options: str) -> None:
+        scenario = load_scenario(scenario_file(folder, net, EGO.format(position) + traffic, **options), "ego")
         self.world = World(scenario, folder)
         entry = self.world.await_ego((), lambda _: True)
         route = RoadMap.load(net).route(entry.edges, entry.lane, entry.position, None, 300.0)
@@ -67,6 +67,23 @@ def test_who_comes_on_either_lane_stops_behind_an_ego_across_both_until_it_is_ou
     assert gaps[BACK - 1] == min(gaps[:BACK])
     assert gaps[-1] > 20.0  # on the free lane it has passed
     assert names == {"other"}
+
+
+def test_who_comes_over_the_junction_stops_behind_the_rear_of_an_ego_that_is_still_on_it(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    net = plain_file(
+        '<node id="a" x="-200" y="0"/>' + NODES,
+        '<edge id="ab" from="a" to="b" speed="13.9" numLanes="2"/>' + EDGES,
+    )
+    traffic = FROM_BEHIND.format(1).replace('from="bc"', 'from="ab"')
+
+    def job() -> list[float]:
+        drive = Drive(tmp_path, net, traffic, position=0.2)
+        drive.go(BACK)
+        return drive.gaps
+
+    assert 0.5 < min(in_child(job)) < 5.0
 
 
 @pytest.mark.parametrize("end", ["of its trip", "by SUMO"])
@@ -138,3 +155,4 @@ def test_a_body_beyond_the_end_of_a_lane_is_not_in_its_way() -> None:
     middle = shapely.LineString([(0.0, 0.0), (100.0, 0.0)])
     assert taken(shapely.box(100.5, -0.9, 105.5, 0.9), middle, 3.2) is None
     assert taken(shapely.box(98.0, -0.9, 103.0, 0.9), middle, 3.2) == pytest.approx((98.0, 100.0))
+    assert taken(shapely.box(-3.0, -0.9, 2.0, 0.9), middle, 3.2) == pytest.approx((-3.0, 2.0))
