@@ -59,7 +59,10 @@ class Ego:
         return self.route.lane_at(front, offset)
 
     def straddled(self, lane: str) -> tuple[str, ...]:
-        """The route's lanes of roads beside which an ego may be that is slow: its front is on `lane`."""
+        """Where it may be across more lanes than one: the route's lanes under its ends, its front being on `lane`.
+
+        None while it is fast; junctions have none.
+        """
         if self.truth.speed > SLOW:
             return ()
         rear = self.route.lane_ids[self.route.row_at(self.station())]

@@ -309,7 +309,7 @@ class Session:
         self._announce(ego, truth.speed)
 
     def straddle(self, ego: str, truth: EgoTruth, shape: VehicleShape, lanes: Sequence[str]) -> None:
-        """Tell SUMO on which lanes an ego is besides; effective with the next step.
+        """Tell SUMO which lanes an ego is on beside the one where SUMO has it; effective with the next step.
 
         There a shadow stands for it, a vehicle that nobody sees but SUMO's drivers. The sub-lane model needs none.
 
@@ -317,7 +317,7 @@ class Session:
             ego: The vehicle.
             truth: How it moves now.
             shape: Its body.
-            lanes: Of the route, that its ends are on; none: it is on no second one.
+            lanes: The route's, of roads, under its ends; none: it is on no second one.
         """
         adopted = self._adopted[ego]
         parts = self._straddled(ego, outline(truth, shape), lanes) if lanes and not self._has_sublanes else {}

@@ -25,7 +25,7 @@ _GREENS = (SignalColour.GREEN, SignalColour.PERMISSIVE)
 _SWUNG = 1.0  # [m] that a line leads aside to turn back, from which on who stands there is across the next lane
 _STRAIGHT = 0.1  # [m] of the rear axle beside the middle of its lane, with which the body is in it
 _SWING = 25.0  # [m] before a line, within which one swings out to turn back
-_ON_YELLOW = 2.0  # [s] to the line, for which yellow lasts: who has swung out goes on
+_ON_YELLOW = 2.0  # [s] for which yellow lasts: who has swung out, and comes to the line within, goes on
 _MERGE_REACH = 10.0  # [m] past the junction, where traffic from other approaches still joins
 
 
@@ -61,6 +61,7 @@ class Junctions:
         self._gaps = [_gap(line, route.crossings, config) for line in self._lines]
         self._swings = [_swing(line, route, shape) for line in self._lines]
         self._seen: dict[str, tuple[float, SignalColour]] = {}
+        self._yellow: dict[int, float] = {}  # since when the light of a line shows it
         self._entered: set[int] = set()  # lines crossed on yellow, for which it was too late to stop
         self._kept: set[int] = set()  # lines that it has begun to stop at on yellow or red
         self._standing: dict[int, float] = {}  # since when the ego stands at a line
@@ -131,7 +132,8 @@ class Junctions:
         colour = self._colour(signal, time)
         needed = speed * speed / (2.0 * max(distance, 0.1))
         most = self._config.hard_braking if index in self._kept else self._config.yellow_braking
-        is_in_way = self._is_swinging(index, distance) and distance < _ON_YELLOW * speed
+        left = self._yellow_left(index, colour, time)
+        is_in_way = self._is_swinging(index, distance) and distance < left * speed
         if colour is SignalColour.YELLOW and (needed > most or is_in_way):
             self._entered.add(index)
         elif distance > 0.0 and needed < self._config.comfort_braking:
@@ -155,6 +157,13 @@ class Junctions:
         if distance > reach or index in self._entered or self._stood(index, time, self._config.unseen_patience):
             return None, line.yields_to
         return f"stop unseen {signal}", line.yields_to
+
+    def _yellow_left(self, index: int, colour: SignalColour | None, time: float) -> float:
+        """How long the light of a line is taken to be yellow yet [s]; 0 while it is not."""
+        if colour is not SignalColour.YELLOW:
+            self._yellow.pop(index, None)
+            return 0.0
+        return self._yellow.setdefault(index, time) + _ON_YELLOW - time
 
     def _colour(self, signal: str, time: float) -> SignalColour | None:
         seen, colour = self._seen.get(signal, (-1e9, None))

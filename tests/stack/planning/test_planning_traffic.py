@@ -605,12 +605,12 @@ def test_a_light_that_nobody_sees_is_passed_after_a_stop_at_its_line() -> None:
     assert drive(swinging_out(100.0), 40.0, speed=10.0).fronts[-1] > 100.0
 
 
-@pytest.mark.parametrize(("station", "passes"), [(91.0, True), (82.0, False)])
+@pytest.mark.parametrize(("station", "passes"), [(91.0, True), (88.5, False), (82.0, False)])
 def test_who_has_swung_out_goes_on_at_yellow_where_it_comes_to_the_line_in_time(
     station: float, *, passes: bool
 ) -> None:
     def signals(time: float) -> dict[str, SignalColour]:
-        return {"J/2": SignalColour.YELLOW if time < 1.0 else SignalColour.RED}
+        return {"J/2": SignalColour.YELLOW if time < 2.0 else SignalColour.RED}
 
     driven = drive(swinging_out(100.0), 8.0, station=station, speed=3.0, signals=signals)
     assert (driven.fronts[-1] > 100.0) == passes
