@@ -128,7 +128,7 @@ class Session:
         self._footing = Footing(self._walking_area)
         self._inner: dict[str, list[Strip]] = {}  # lanes of vehicles on junctions
         self._adopted: dict[str, _Adopted] = {}  # by ego
-        self._shadowed: set[str] = set()  # edges
+        self._shadowed: set[str] = set()  # edges for which there is a route of a shadow
         self._has_sublanes = float(libsumo.simulation.getOption("lateral-resolution")) > 0.0
         self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
@@ -320,7 +320,7 @@ class Session:
             lanes: The route's, of roads, under its ends; none: it is on no second one.
         """
         adopted = self._adopted[ego]
-        parts = self._straddled(ego, outline(truth, shape), lanes) if lanes and not self._has_sublanes else {}
+        parts = {} if self._has_sublanes else self._straddled(ego, truth, shape, lanes)
         for lane in adopted.shadows:
             if lane not in parts:
                 self._take_away(_shadow(ego, lane))
@@ -347,23 +347,26 @@ class Session:
         if self.has(shadow):
             libsumo.vehicle.remove(shadow)
 
-    def _straddled(self, ego: str, body: shapely.Polygon, lanes: Sequence[str]) -> dict[str, tuple[float, float]]:
+    def _straddled(
+        self, ego: str, truth: EgoTruth, shape: VehicleShape, lanes: Sequence[str]
+    ) -> dict[str, tuple[float, float]]:
         """Lanes that an ego is on, beside where SUMO has found it, and from where to where [m]."""
-        found, parts = libsumo.vehicle.getLaneID(ego), {}
+        found, beside = libsumo.vehicle.getLaneID(ego), list[str]()
         for lane in lanes:
             edge, _, text = lane.rpartition("_")
             index, count = int(text), libsumo.edge.getLaneNumber(edge)
-            beside = [f"{edge}_{near}" for near in (index - 1, index + 1) if 0 <= near < count]
-            if found in beside:
-                beside = [*(name for name in beside if name != found), lane]
-            for name in beside:
-                middle, width = self._middle(name)
-                part = taken(body, middle, width)
-                if part is not None and not self._is_there(name, *part, ego):
-                    parts[name] = part
+            near = [f"{edge}_{next_to}" for next_to in (index - 1, index + 1) if 0 <= next_to < count]
+            beside += [*near, lane] if found in near else near
+        if not beside:
+            return {}
+        body, parts = outline(truth, shape), {}
+        for lane in beside:
+            part = taken(body, *self._middle(lane)) if lane != found else None
+            if part is not None and not self._is_occupied(lane, *part, ego):
+                parts[lane] = part
         return parts
 
-    def _is_there(self, lane: str, begin: float, end: float, ego: str) -> bool:
+    def _is_occupied(self, lane: str, begin: float, end: float, ego: str) -> bool:
         """Whether somebody is on that part of a lane already: who is stopped beside an ego must not stay for ever."""
         of, shadow = libsumo.vehicle, _shadow(ego, lane)
         others = (name for name in libsumo.lane.getLastStepVehicleIDs(lane) if name not in (ego, shadow))

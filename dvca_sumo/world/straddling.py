@@ -14,7 +14,7 @@ from dvca_sumo.truth import EgoTruth
 
 SLOW = 5.0  # [m/s] above, an ego is on its way from one lane to the other, and soon on one
 _REACH = 0.4  # [m] into a lane: up to that, a car in its middle has room to pass
-_SHORTEST = 0.1  # [m]
+_SHORTEST = 0.1  # [m] of a lane, less is nobody's way
 
 
 def outline(truth: EgoTruth, shape: VehicleShape) -> shapely.Polygon:
