@@ -118,7 +118,7 @@ class TrackingController:
         reached += _along(track.pose(_place(track.stations, reached)), localization)
         return ControlCommand(
             time=now,
-            acceleration=self._acceleration(localization.speed, _at(wanted, track.speeds), -ahead, track, age),
+            acceleration=self._acceleration(localization.speed, wanted, reached, track, age),
             steering=self._steering(localization, track, reached),
         )
 
@@ -140,17 +140,18 @@ class TrackingController:
         most = config.max_lateral_acceleration / max(1.0, speed * speed)
         return _limited(math.atan(self._wheelbase * _limited(curvature, most)), config.max_steering)
 
-    def _acceleration(self, speed: float, wanted: float, behind: float, track: _Track, age: float) -> float:
+    def _acceleration(self, speed: float, wanted: Place, reached: float, track: _Track, age: float) -> float:
         config = self._config
-        if wanted <= config.standstill_speed:
-            soon = _at(_place(track.times, age + config.standstill_preview), track.speeds)
-            if soon <= config.standstill_speed:
+        ahead = _place(track.times, age + config.acceleration_preview)
+        if _at(ahead, track.speeds) <= config.standstill_speed:
+            soon = _place(track.times, age + config.standstill_preview)
+            if _at(soon, track.speeds) <= config.standstill_speed:
                 self._integral = 0.0
-                return self._halting(speed, behind)
-        error = wanted - speed
-        position = _limited(behind, config.max_position_error)
-        ahead = _at(_place(track.times, age + config.acceleration_preview), track.accelerations)
-        direct = ahead + config.speed_gain * error + config.position_gain * position + self._integral
+                return self._halting(speed, _at(soon, track.stations) - reached)
+        error = _at(wanted, track.speeds) - speed
+        position = _limited(_at(wanted, track.stations) - reached, config.max_position_error)
+        direct = _at(ahead, track.accelerations) + self._integral
+        direct += config.speed_gain * error + config.position_gain * position
         limited = min(config.max_acceleration, max(-config.max_braking, direct))
         # Anti-windup: what the actuator cannot give is not asked for more and more.
         if limited == direct:
@@ -166,7 +167,7 @@ class TrackingController:
         # Half a lag's way is already gone before the brake answers.
         room = remaining - 0.5 * config.acceleration_preview * speed
         needed = 0.5 * speed * speed / room if room > 0.0 else config.stop_braking + config.speed_gain * speed
-        return -min(config.max_braking, needed)
+        return -min(config.max_braking, max(needed, config.standstill_braking))
 
 
 def _limited(value: float, most: float) -> float:

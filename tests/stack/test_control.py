@@ -160,6 +160,23 @@ def test_a_trajectory_that_stands_a_little_ahead_is_not_crept_towards() -> None:
     assert passed[-1].x == 0.0
 
 
+@pytest.mark.parametrize(("set_off", "seconds"), [(0.5, 0.75), (0.7, 0.6), (1.0, 0.65)])
+def test_told_to_stand_while_it_sets_off_it_does_at_once(set_off: float, seconds: float) -> None:
+    """By a trajectory that brakes as hard as tyres allow: it ends before the brakes answer."""
+    path, braking = Path.from_curvature(lambda s: 0.0 * s, 100.0), 5.0
+
+    def plan(truth: EgoTruth) -> Trajectory:
+        t = TRAJECTORY_TIMES if truth.time < set_off - 0.01 else np.minimum(TRAJECTORY_TIMES, truth.speed / braking)
+        rate = 2.0 if truth.time < set_off - 0.01 else -braking
+        speeds = truth.speed + rate * t
+        accelerations = np.where(truth.speed + rate * TRAJECTORY_TIMES > 0.0, rate, 0.0)
+        return path.trajectory(truth.time, truth.x + truth.speed * t + 0.5 * rate * t * t, speeds, accelerations)
+
+    passed = drive(at_rest_or_speed(0.0), plan, set_off + seconds)
+    assert passed[round(100 * set_off) - 1].speed > 0.4
+    assert passed[-1].speed == 0.0
+
+
 def test_sets_off_from_standstill_and_reaches_the_speed_asked_for() -> None:
     path = Path.from_curvature(lambda s: 0.0 * s, 200.0)
 
