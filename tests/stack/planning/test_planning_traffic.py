@@ -11,6 +11,7 @@ from planned_drives import (
     Drive,
     assert_drivable,
     believed,
+    bent_points,
     car,
     curve_points,
     drive,
@@ -50,6 +51,21 @@ def test_back_from_a_turn_that_swings_out_the_ego_lets_those_pass_who_drive_wher
         other = car(3, 67.0, y, heading=2.76, speed=6.6)
         driven = drive(road(turn), 0.8, station=74.5, actors=[other])
         assert bool(driven.speeds[-1] < 0.3) == passes
+
+
+@pytest.mark.parametrize(("behind", "speed"), [(14.0, 6.0), (18.0, 7.5), (22.0, 7.5), (22.0, 9.0)])
+def test_before_a_turn_that_swings_out_the_ego_lets_those_pass_who_come_up_in_the_lane_that_it_has_left(
+    behind: float, speed: float
+) -> None:
+    """They are in its way behind it, leave that where it swings out, and come across it where it turns."""
+    curvature = np.repeat([0.0, -0.04, 0.04, 0.0, 0.18, 0.0], [60, 9, 9, 4, 17, 100])
+    route = road(bent_points(curvature))
+    is_out = (route.line.stations > 65.0) & (route.line.stations < 105.0)
+    left, right = np.where(is_out, 5.3, route.lane_left), np.where(is_out, -0.1, route.lane_right)
+    route = msgspec.structs.replace(route, lane_left=left, road_left=left, lane_right=right, road_right=right - 1.0)
+    driven = drive(route, 6.0, station=80.0, actors=[car(3, 78.0 - behind, speed=speed)])
+    assert driven.clearances.min() > 1.0
+    assert driven.speeds[-1] > 1.0  # it goes when they have passed
 
 
 def test_who_comes_onto_the_junction_aslant_and_does_not_wait_is_braked_for_at_once() -> None:
