@@ -32,7 +32,7 @@ from dvca_sumo.world.lingering import Lingering
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 from dvca_sumo.world.setback import Setback
 from dvca_sumo.world.signals import Signals
-from dvca_sumo.world.straddling import outline, taken
+from dvca_sumo.world.straddling import SLOW, outline, taken
 
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
 NEVER_TELEPORTED = "dvca.ego"  # vehicle type of an adopted ego
@@ -48,6 +48,7 @@ _INDICATORS = {1: 0b10, 0: 0, -1: 0b1}  # by the side they tell; bits of SUMO's 
 _BRAKE_LIGHT = 0b1000
 _TOLD_ANEW = 0.2  # [m] of difference in length
 _STANDING = 0.1  # [m/s] up to which SUMO's vehicles show their brake lights
+_HELD = 0.3  # [m] within the edge of the lane that an ego is held on
 _AT_SIGNAL = 10.0  # [m] before it a vehicle waits for it
 _GOING = "gGoO"  # colours of signals that let go
 _TWO_WHEELED = ("bicycle", "moped", "motorcycle", "scooter")
@@ -114,7 +115,8 @@ class Session:
         types = folder / "ego.add.xml"
         types.write_text(
             f'<additional><vType id="{NEVER_TELEPORTED}" timeToTeleport="-1"/>'
-            f'<vType id="{SHADOW}" vClass="ignoring" timeToTeleport="-1"/></additional>'
+            f'<vType id="{SHADOW}" vClass="ignoring" timeToTeleport="-1" emergencyDecel="{_ANY_BRAKING:g}"/>'
+            "</additional>"
         )
         files = input_words(scenario.configuration, folder, types)
         try:
@@ -289,14 +291,16 @@ class Session:
             lane: Of the route, that it is on: without it SUMO may pick a crossing junction lane.
             indicated: Which way it indicates: 1 left, -1 right, 0 not at all.
         """
-        edge, _, index = lane.rpartition("_")
         found = libsumo.vehicle.getLaneID(ego)
         adopted = self._adopted[ego]
         ahead = front - adopted.setback.at(truth.x, truth.y, truth.speed, is_on_lane=bool(found))
         x = truth.x + ahead * math.cos(truth.heading)
         y = truth.y + ahead * math.sin(truth.heading)
+        if found and truth.speed <= SLOW and not self._has_sublanes:
+            lane, x, y = self._held(ego, lane, x, y, found)
         middle, width = self._middle(lane)
         x, y = adopted.inset.at(x, y, middle, 0.5 * (width + adopted.width), is_on_lane=bool(found))
+        edge, _, index = lane.rpartition("_")
         angle = 90.0 - math.degrees(truth.heading)
         adopted.itinerary.reach(edge)
         if found and libsumo.vehicle.getRouteID(ego) != adopted.itinerary.route:
@@ -307,6 +311,27 @@ class Session:
         # SUMO's own would tell what its driver, overruled, meant to do.
         libsumo.vehicle.setSignals(ego, _INDICATORS[indicated] | (_BRAKE_LIGHT if _is_braking(truth) else 0))
         self._announce(ego, truth.speed)
+
+    def _held(self, ego: str, lane: str, x: float, y: float, found: str) -> tuple[str, float, float]:
+        """The lane and place to tell SUMO of an ego with its front at (x, y), on its way to `lane`.
+
+        They are those where SUMO has found it, while somebody is beside it on the next lane of the road: on the same
+        lane as the ego, that one would take it for a leader and stop dead, in the way of both.
+        """
+        road, (middle, width) = lane.rpartition("_")[0], self._middle(found)
+        point, adopted = shapely.Point(x, y), self._adopted[ego]
+        away, most = middle.distance(point), 0.5 * width - _HELD
+        if found.rpartition("_")[0] != road or (lane == found and away <= most):
+            return lane, x, y
+        for next_to in _beside(found):
+            line, reach = self._middle(next_to)
+            front = line.project(point)
+            if line.distance(point) < 0.5 * (reach + adopted.width) and self._is_occupied(
+                next_to, front - adopted.length, front, ego
+            ):
+                near, part = middle.interpolate(middle.project(point)), min(most / away, 1.0) if away > 0.0 else 1.0
+                return found, near.x + part * (x - near.x), near.y + part * (y - near.y)
+        return lane, x, y
 
     def straddle(self, ego: str, truth: EgoTruth, shape: VehicleShape, lanes: Sequence[str]) -> None:
         """Tell SUMO which lanes an ego is on beside the one where SUMO has it; effective with the next step.
@@ -353,9 +378,7 @@ class Session:
         """Lanes that an ego is on, beside where SUMO has found it, and from where to where [m]."""
         found, beside = libsumo.vehicle.getLaneID(ego), list[str]()
         for lane in lanes:
-            edge, _, text = lane.rpartition("_")
-            index, count = int(text), libsumo.edge.getLaneNumber(edge)
-            near = [f"{edge}_{next_to}" for next_to in (index - 1, index + 1) if 0 <= next_to < count]
+            near = _beside(lane)
             beside += [*near, lane] if found in near else near
         if not beside:
             return {}
@@ -503,6 +526,13 @@ class Session:
             of = libsumo.person
             self._bodies[key] = Body(ObjectClass.PEDESTRIAN, of.getLength(name), of.getWidth(name), 0.0)
         return key
+
+
+def _beside(lane: str) -> list[str]:
+    """The lanes next to one of the same road."""
+    edge, _, index = lane.rpartition("_")
+    count = libsumo.edge.getLaneNumber(edge)
+    return [f"{edge}_{next_to}" for next_to in (int(index) - 1, int(index) + 1) if 0 <= next_to < count]
 
 
 def _shadow(ego: str, lane: str) -> str:

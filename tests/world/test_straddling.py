@@ -18,12 +18,12 @@ from dvca_sumo.world import VehicleLimits, World
 from dvca_sumo.world.straddling import taken
 
 NODES = '<node id="b" x="0" y="0"/><node id="c" x="300" y="0"/>'
-EDGES = '<edge id="bc" from="b" to="c" speed="13.9" numLanes="2"/>'
+EDGES = '<edge id="bc" from="b" to="c" speed="13.9" numLanes="2" width="4"/>'
 EGO = '<trip id="ego" from="bc" to="bc" depart="0" departPos="{}" departSpeed="0" departLane="0"/>'
 FROM_BEHIND = '<trip id="other" from="bc" to="bc" depart="5" departPos="0" departSpeed="max" departLane="{}"/>'
 BESIDE = '<trip id="other" from="bc" to="bc" depart="1" departPos="98" departSpeed="0" departLane="1"/>'
 OUT, BACK = 15, 250  # steps after which it stands across the lanes, and goes back to its own
-ASIDE = 1.5  # [m]
+ASIDE = 2.1  # [m] its front is over the edge then
 
 
 class Drive:
@@ -74,7 +74,7 @@ def test_who_comes_over_the_junction_stops_behind_the_rear_of_an_ego_that_is_sti
 ) -> None:
     net = plain_file(
         '<node id="a" x="-200" y="0"/>' + NODES,
-        '<edge id="ab" from="a" to="b" speed="13.9" numLanes="2"/>' + EDGES,
+        '<edge id="ab" from="a" to="b" speed="13.9" numLanes="2" width="4"/>' + EDGES,
     )
     traffic = FROM_BEHIND.format(1).replace('from="bc"', 'from="ab"')
 
