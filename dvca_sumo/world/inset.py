@@ -32,10 +32,16 @@ class Inset:
         """
         if is_on_lane and not self._is_needed:
             return x, y
-        near = middle.interpolate(middle.project(shapely.Point(x, y)))
-        away, most = math.dist((x, y), (near.x, near.y)), reach - _OVERLAP
+        away, most = middle.distance(shapely.Point(x, y)), reach - _OVERLAP
         self._is_needed = most < away < _FARTHEST
-        if not self._is_needed:
-            return x, y
-        part = most / away
-        return near.x + part * (x - near.x), near.y + part * (y - near.y)
+        return within(x, y, middle, most) if self._is_needed else (x, y)
+
+
+def within(x: float, y: float, middle: shapely.LineString, most: float) -> tuple[float, float]:
+    """The place, or the one on the way from it to the line that is no farther than `most` [m] from that."""
+    near = middle.interpolate(middle.project(shapely.Point(x, y)))
+    away = math.dist((x, y), (near.x, near.y))
+    if away <= most:
+        return x, y
+    part = most / away
+    return near.x + part * (x - near.x), near.y + part * (y - near.y)

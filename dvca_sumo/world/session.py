@@ -26,7 +26,7 @@ from dvca_sumo.truth import EgoTruth, ObjectsTruth
 from dvca_sumo.world.crowd import Body, Crowd
 from dvca_sumo.world.entry import Entry
 from dvca_sumo.world.footing import Footing
-from dvca_sumo.world.inset import Inset
+from dvca_sumo.world.inset import Inset, within
 from dvca_sumo.world.itinerary import Itinerary
 from dvca_sumo.world.lingering import Lingering
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
@@ -318,19 +318,16 @@ class Session:
         They are those where SUMO has found it, while somebody is beside it on the next lane of the road: on the same
         lane as the ego, that one would take it for a leader and stop dead, in the way of both.
         """
-        road, (middle, width) = lane.rpartition("_")[0], self._middle(found)
-        point, adopted = shapely.Point(x, y), self._adopted[ego]
-        away, most = middle.distance(point), 0.5 * width - _HELD
-        if found.rpartition("_")[0] != road or (lane == found and away <= most):
-            return lane, x, y
-        for next_to in _beside(found):
-            line, reach = self._middle(next_to)
-            front = line.project(point)
-            if line.distance(point) < 0.5 * (reach + adopted.width) and self._is_occupied(
-                next_to, front - adopted.length, front, ego
-            ):
-                near, part = middle.interpolate(middle.project(point)), min(most / away, 1.0) if away > 0.0 else 1.0
-                return found, near.x + part * (x - near.x), near.y + part * (y - near.y)
+        (middle, width), point = self._middle(found), shapely.Point(x, y)
+        most, length = 0.5 * width - _HELD, self._adopted[ego].length
+        is_on_its_way = lane != found or middle.distance(point) > most
+        if is_on_its_way and lane.rpartition("_")[0] == found.rpartition("_")[0]:
+            for next_to in _beside(found):
+                line, reach = self._middle(next_to)
+                front = line.project(point)
+                is_there = line.distance(point) < 0.5 * (reach + self._adopted[ego].width)
+                if is_there and self._is_occupied(next_to, front - length, front, ego):
+                    return found, *within(x, y, middle, most)
         return lane, x, y
 
     def straddle(self, ego: str, truth: EgoTruth, shape: VehicleShape, lanes: Sequence[str]) -> None:
