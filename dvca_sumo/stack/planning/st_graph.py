@@ -215,14 +215,20 @@ def leading(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> tuple[
 
 
 def leader_of(rows: list[int], graph: Graph, shape: VehicleShape) -> Leader | None:
-    """The nearest of the futures `rows` at each moment, while they occupy the path; carried on at constant speed."""
+    """The nearest of the futures `rows` at each moment, while they occupy the path; carried on at constant speed.
+
+    Who comes towards the ego, and is about to occupy it, is there already: an ego that stands does not set off for a
+    moment.
+    """
     if not rows:
         return None
     scene, low = graph.scene, graph.low[rows]
-    places = np.where(graph.occupied[rows], low - shape.front, _NEVER)
+    count = low.shape[1]
+    columns, first = np.arange(count), np.array([graph.first[row] for row in rows])
+    comes = (scene.futures.directions[rows, 0] < 0.0) & (scene.times[first] <= PRESENT)
+    is_there = graph.occupied[rows] | (comes[:, None] & (columns < first[:, None]))
+    places = np.where(is_there, low - shape.front, _NEVER)
     nearest = places.argmin(axis=0)
-    count = len(nearest)
-    columns = np.arange(count)
     ends = np.minimum(columns + 1, count - 1)
     rears, speeds, times = np.empty(count + 1), np.empty(count + 1), np.empty(count + 1)
     rears[:-1] = places[nearest, columns]

@@ -88,6 +88,14 @@ def test_a_slow_ego_stops_at_once_for_who_comes_into_its_way_beside_its_front(
     assert driven.speeds[-1] < 0.1
 
 
+@pytest.mark.parametrize(("y", "heading"), [(4.5, 0.3), (5.0, 0.3), (5.0, 0.45), (5.5, 0.45)])
+def test_a_standing_ego_does_not_set_off_towards_a_bus_that_swings_into_its_way(y: float, heading: float) -> None:
+    bus = car(3, 33.0, y, heading=math.pi + heading, speed=6.5, size=(12.0, 2.5))
+    driven = drive(road(), 1.0, station=20.0, actors=[bus])
+    assert driven.clearances[0] > 3.0
+    assert driven.speeds.max() == 0.0
+
+
 def test_leader_that_stops_is_stopped_behind() -> None:
     driven = drive(road(), 30.0, speed=10.0, actors=[car(3, 45.0, speed=9.0, stays_from=8.0)])
     assert driven.speeds[-1] == 0.0
