@@ -29,7 +29,7 @@ class ControlConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     steering_preview: float = 0.15  # [s] the path's curvature is taken this far ahead
     max_steering: float = 0.55  # [rad]
     max_lateral_acceleration: float = 6.0  # [m/s^2]
-    acceleration_preview: float = 0.2  # [s] the trajectory's acceleration is taken this far ahead
+    acceleration_preview: float = 0.2  # [s] the trajectory's acceleration is taken this far ahead: the brakes' lag
     position_gain: float = 0.6  # [1/s^2]
     max_position_error: float = 3.0  # [m] larger ones count as this
     speed_gain: float = 1.5  # [1/s]
@@ -37,8 +37,8 @@ class ControlConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     max_integral: float = 0.3  # [m/s^2] the integral's share of the acceleration
     max_acceleration: float = 3.0  # [m/s^2]
     max_braking: float = 8.0  # [m/s^2] positive number
-    standstill_speed: float = 0.1  # [m/s] a trajectory slower than this wants to stand
-    standstill_preview: float = 0.5  # [s] unless it is faster this much later
+    standstill_speed: float = 0.1  # [m/s] a trajectory slower than this, that far ahead, wants to stand ...
+    standstill_preview: float = 0.5  # [s] ... unless it is faster this much ahead
     standstill_braking: float = 2.0  # [m/s^2] held while standing
     stop_braking: float = 3.0  # [m/s^2] when there is nothing (any more) to follow
 
@@ -160,7 +160,7 @@ class TrackingController:
         return limited
 
     def _halting(self, speed: float, remaining: float) -> float:
-        """Comes to rest `remaining` metres ahead, or at once when that point is reached."""
+        """Comes to rest within `remaining` metres, no gentler than it holds there; at once when they are gone."""
         config = self._config
         if speed <= config.standstill_speed:
             return -config.standstill_braking
