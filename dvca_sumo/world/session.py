@@ -318,15 +318,15 @@ class Session:
         They are those where SUMO has found it, while somebody is beside it on the next lane of the road: on the same
         lane as the ego, that one would take it for a leader and stop dead, in the way of both.
         """
-        (middle, width), point = self._middle(found), shapely.Point(x, y)
-        most, length = 0.5 * width - _HELD, self._adopted[ego].length
+        adopted, point, (middle, width) = self._adopted[ego], shapely.Point(x, y), self._middle(found)
+        most = 0.5 * width - _HELD
         is_on_its_way = lane != found or middle.distance(point) > most
         if is_on_its_way and lane.rpartition("_")[0] == found.rpartition("_")[0]:
-            for next_to in _beside(found):
+            for next_to in _adjacent_lanes(found):
                 line, reach = self._middle(next_to)
                 front = line.project(point)
-                is_there = line.distance(point) < 0.5 * (reach + self._adopted[ego].width)
-                if is_there and self._is_occupied(next_to, front - length, front, ego):
+                is_there = line.distance(point) < 0.5 * (reach + adopted.width)
+                if is_there and self._is_occupied(next_to, front - adopted.length, front, ego):
                     return found, *within(x, y, middle, most)
         return lane, x, y
 
@@ -375,7 +375,7 @@ class Session:
         """Lanes that an ego is on, beside where SUMO has found it, and from where to where [m]."""
         found, beside = libsumo.vehicle.getLaneID(ego), list[str]()
         for lane in lanes:
-            near = _beside(lane)
+            near = _adjacent_lanes(lane)
             beside += [*near, lane] if found in near else near
         if not beside:
             return {}
@@ -525,8 +525,8 @@ class Session:
         return key
 
 
-def _beside(lane: str) -> list[str]:
-    """The lanes next to one of the same road."""
+def _adjacent_lanes(lane: str) -> list[str]:
+    """The lanes to the left and right of a lane, of the same road."""
     edge, _, index = lane.rpartition("_")
     count = libsumo.edge.getLaneNumber(edge)
     return [f"{edge}_{next_to}" for next_to in (int(index) - 1, int(index) + 1) if 0 <= next_to < count]
