@@ -46,6 +46,12 @@ def test_an_object_in_the_way_is_a_reason_and_one_beside_it_is_none() -> None:
     assert judged(NoProgress, waiting(60.0, objects=(car("far", 106.0),))).answer is Answer.VIOLATED
 
 
+@pytest.mark.parametrize("heading", [1.8, -1.8])
+def test_one_that_stands_across_the_way_is_a_reason_though_a_corner_of_it_is_beside_the_ego(heading: float) -> None:
+    across: Row = ("across", (91.35, 1.4 if heading > 0.0 else -1.4, heading, 5.0, 1.8), (0.0, 0.0))
+    assert judged(NoProgress, waiting(60.0, objects=(across,))).answer is Answer.KEPT
+
+
 def test_traffic_at_the_junction_ahead_is_a_reason() -> None:
     crossing: Row = ("cross", (110.0, 20.0, 1.57, 4.6, 1.8), (0.0, -8.0))
     parked: Row = ("cross", (110.0, 20.0, 1.57, 4.6, 1.8), (0.0, 0.0))

@@ -33,6 +33,14 @@ def test_closing_in_just_slowly_enough_is_fine() -> None:
     assert judged(TimeToCollision, moments).answer is Answer.VIOLATED
 
 
+def test_of_one_that_stands_aslant_what_reaches_into_the_way_counts() -> None:
+    aslant: Row = ("aslant", (57.0, 2.0, -0.6, 5.0, 1.8), (0.0, 0.0))
+    reaches_in = 57.014  # [m] the station at which its side comes into the ego's way; that of its corner is 54.428
+    for gap, expected in ((5.01, Answer.KEPT), (4.99, Answer.VIOLATED)):
+        moments = [moment(0.0, reaches_in - gap, 10.0, objects=[aslant])]
+        assert judged(TimeToCollision, moments, thresholds=AT_ONCE).answer is expected
+
+
 def test_a_contact_that_is_near_for_a_moment_only_is_fine() -> None:
     def passing(moments: int) -> list[Moment]:
         """Two cars in a bend that point at each other for so many moments."""
