@@ -36,6 +36,7 @@ class Ego:
         self.vehicle = Vehicle(self.shape, limits, departure(entry, route, self.shape))
         self.signals = _signals(route)  # ids of the signal heads on its route
         self._turns = _turns(route)
+        self._origins = _origins(route)
         self._way = _Way(route, self.shape)
 
     @property
@@ -58,15 +59,19 @@ class Ego:
         _, offset = line.place(*nose, between=(front - reach, front + reach))
         return self.route.lane_at(front, offset)
 
-    def straddled(self, lane: str) -> tuple[str, ...]:
-        """Where it may be across more lanes than one: the route's lanes under its ends, its front being on `lane`.
+    def straddled(self, lane: str) -> tuple[tuple[str, ...], tuple[str, str] | None]:
+        """Where it may be across more lanes than one, its front being on `lane`; nowhere while it is fast.
 
-        None while it is fast; junctions have none.
+        Returns:
+            The route's lanes of roads under its ends; and its lane of the junction it is on, with that of the road it
+            has come by.
         """
         if self.truth.speed > SLOW:
-            return ()
+            return (), None
         rear = self.route.lane_ids[self.route.row_at(self.station())]
-        return tuple(name for name in dict.fromkeys((lane, rear)) if not name.startswith(":"))
+        ends = tuple(dict.fromkeys((lane, rear)))
+        crossed = next(((end, self._origins[end]) for end in ends if end in self._origins), None)
+        return tuple(end for end in ends if not end.startswith(":")), crossed
 
     def occupied(self) -> float:
         """How much lane it takes up [m]: more than its length where it cuts the corner that the lanes drive out."""
@@ -155,6 +160,17 @@ def _turns(route: Route) -> tuple[tuple[float, float, int], ...]:
         for line in route.stop_lines
         if line.direction in _SIDES and line.station < route.destination
     )
+
+
+def _origins(route: Route) -> dict[str, str]:
+    """The lane of a road by which the route comes to each of its lanes of junctions."""
+    origins, road = dict[str, str](), ""
+    for lane in route.lane_ids:
+        if not lane.startswith(":"):
+            road = lane
+        elif road:
+            origins[lane] = road
+    return origins
 
 
 def _signals(route: Route) -> tuple[str, ...]:

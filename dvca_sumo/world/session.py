@@ -40,6 +40,8 @@ SHADOW = "dvca.shadow"  # vehicle type of what stands for an ego on a second lan
 
 # What is asked of who is near tells of which kind they are: the answers for both arrive in one dictionary, by id.
 _VEHICLE, _PERSON = tc.VAR_SPEED, tc.VAR_ANGLE
+_TO, _VIA, _DIRECTION = 0, 4, 6  # of a link: the lane of a road that it leads to, the first one of the junction
+_TURNS_BACK = ("t", "T")
 _NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
 _ANY_BRAKING = 1e4  # [m/s^2] SUMO's own driver, overruled, would warn of braking for the arrival at every step
 _MATCHED_WITHIN = 30.0  # [m] of a lane an ego is on the road; SUMO looks at every lane within that
@@ -131,6 +133,7 @@ class Session:
         self._inner: dict[str, list[Strip]] = {}  # lanes of vehicles on junctions
         self._adopted: dict[str, _Adopted] = {}  # by ego
         self._shadowed: set[str] = set()  # edges for which there is a route of a shadow
+        self._ways: dict[str, list[list[str]]] = {}  # lanes of junctions, way by way, by the lane of a road
         self._has_sublanes = float(libsumo.simulation.getOption("lateral-resolution")) > 0.0
         self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
@@ -330,7 +333,9 @@ class Session:
                     return found, *within(x, y, middle, most)
         return lane, x, y
 
-    def straddle(self, ego: str, truth: EgoTruth, shape: VehicleShape, lanes: Sequence[str]) -> None:
+    def straddle(
+        self, ego: str, truth: EgoTruth, shape: VehicleShape, lanes: Sequence[str], crossed: tuple[str, str] | None
+    ) -> None:
         """Tell SUMO which lanes an ego is on beside the one where SUMO has it; effective with the next step.
 
         There a shadow stands for it, a vehicle that nobody sees but SUMO's drivers. The sub-lane model needs none.
@@ -340,9 +345,10 @@ class Session:
             truth: How it moves now.
             shape: Its body.
             lanes: The route's, of roads, under its ends; none: it is on no second one.
+            crossed: The route's lane of the junction it is on, and that of a road it has come by; None: it is on none.
         """
         adopted = self._adopted[ego]
-        parts = {} if self._has_sublanes else self._straddled(ego, truth, shape, lanes)
+        parts = {} if self._has_sublanes else self._straddled(ego, truth, shape, lanes, crossed)
         for lane in adopted.shadows:
             if lane not in parts:
                 self._take_away(_shadow(ego, lane))
@@ -357,7 +363,8 @@ class Session:
         if not self.has(shadow):
             if edge not in self._shadowed:
                 self._shadowed.add(edge)
-                libsumo.route.add(f"{SHADOW}.{edge}", [edge])
+                road = libsumo.lane.getLinks(lane)[0][_TO].rpartition("_")[0] if edge.startswith(":") else edge
+                libsumo.route.add(f"{SHADOW}.{edge}", [road])
             of.add(shadow, f"{SHADOW}.{edge}", SHADOW)
         middle, _ = self._middle(lane)
         front, behind = middle.interpolate(end), middle.interpolate(max(begin, 0.0))
@@ -370,10 +377,10 @@ class Session:
             libsumo.vehicle.remove(shadow)
 
     def _straddled(
-        self, ego: str, truth: EgoTruth, shape: VehicleShape, lanes: Sequence[str]
+        self, ego: str, truth: EgoTruth, shape: VehicleShape, lanes: Sequence[str], crossed: tuple[str, str] | None
     ) -> dict[str, tuple[float, float]]:
         """Lanes that an ego is on, beside where SUMO has found it, and from where to where [m]."""
-        found, beside = libsumo.vehicle.getLaneID(ego), list[str]()
+        found, beside = libsumo.vehicle.getLaneID(ego), [] if crossed is None else self._other_ways(*crossed)
         for lane in lanes:
             near = _adjacent_lanes(lane)
             beside += [*near, lane] if found in near else near
@@ -385,6 +392,16 @@ class Session:
             if part is not None and not self._is_occupied(lane, *part, ego):
                 parts[lane] = part
         return parts
+
+    def _other_ways(self, own: str, origin: str) -> list[str]:
+        """The lanes of a junction on other ways than `own` from the lane `origin` of a road, without turns back.
+
+        Only lanes that come after another one of the junction: up to there SUMO's drivers see who is on the other ways.
+        """
+        if origin not in self._ways:
+            links = (link for link in libsumo.lane.getLinks(origin) if link[_DIRECTION] not in _TURNS_BACK)
+            self._ways[origin] = [_way_from(link[_VIA]) for link in links if link[_VIA]]
+        return [lane for way in self._ways[origin] if own not in way for lane in way[1:]]
 
     def _is_occupied(self, lane: str, begin: float, end: float, ego: str) -> bool:
         """Whether somebody is on that part of a lane already: who is stopped beside an ego must not stay for ever."""
@@ -523,6 +540,14 @@ class Session:
             of = libsumo.person
             self._bodies[key] = Body(ObjectClass.PEDESTRIAN, of.getLength(name), of.getWidth(name), 0.0)
         return key
+
+
+def _way_from(lane: str) -> list[str]:
+    """The lanes of a junction from this one on."""
+    way = [lane]
+    while onward := libsumo.lane.getLinks(way[-1])[0][_VIA]:
+        way.append(onward)
+    return way
 
 
 def _adjacent_lanes(lane: str) -> list[str]:

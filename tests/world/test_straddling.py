@@ -1,19 +1,22 @@
 """An ego that stands across two lanes is in the way of both, and nobody but SUMO's drivers sees how they are told."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import shapely
 from small_scenarios import in_child, scenario_file
 from watched_world import STEP
 
+from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.boxes import box_of, distances
 from dvca_sumo.messages import ControlCommand, PoseStep
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.scenario import load_scenario
+from dvca_sumo.truth import EgoTruth
 from dvca_sumo.world import VehicleLimits, World
 from dvca_sumo.world.straddling import taken
 
@@ -22,6 +25,18 @@ EDGES = '<edge id="bc" from="b" to="c" speed="13.9" numLanes="2" width="4"/>'
 EGO = '<trip id="ego" from="bc" to="bc" depart="0" departPos="{}" departSpeed="0" departLane="0"/>'
 FROM_BEHIND = '<trip id="other" from="bc" to="bc" depart="5" departPos="0" departSpeed="max" departLane="{}"/>'
 BESIDE = '<trip id="other" from="bc" to="bc" depart="1" departPos="98" departSpeed="0" departLane="1"/>'
+# Two ways from one lane, side by side far into the junction; both wait on it for those who cross.
+FORK_NODES = """
+<node id="a" x="-200" y="0"/><node id="b" x="0" y="0"/><node id="c" x="200" y="20"/><node id="d" x="200" y="-20"/>
+<node id="n" x="0" y="200"/><node id="s" x="0" y="-200"/>"""
+FORK_EDGES = "".join(
+    f'<edge id="{name}" from="{name[0]}" to="{name[1]}" speed="13.9" priority="{priority}"/>'
+    for name, priority in (("ab", 1), ("bc", 1), ("bd", 1), ("nb", 9), ("bs", 9))
+)
+FORK_WAYS = "".join(f'<connection from="ab" to="{to}" fromLane="0" toLane="0" contPos="5"/>' for to in ("bc", "bd"))
+FORKING = """
+<trip id="ego" from="ab" to="bc" depart="0" departPos="150" departSpeed="0"/>
+<trip id="other" from="ab" to="bd" depart="4" departPos="100" departSpeed="8"/>"""
 OUT, BACK = 15, 250  # steps after which it stands across the lanes, and goes back to its own
 ASIDE = 2.1  # [m] its front is over the edge then
 
@@ -84,6 +99,38 @@ def test_who_comes_over_the_junction_stops_behind_the_rear_of_an_ego_that_is_sti
         return drive.gaps
 
     assert 0.5 < min(in_child(job)) < 5.0
+
+
+@pytest.mark.parametrize("past", [1, 4, 9, 13])  # [m] the rear axle is beyond the stop line
+def test_who_leaves_its_lane_by_a_way_beside_the_egos_stops_behind_it_on_the_junction(
+    tmp_path: Path, plain_file: Callable[..., Path], past: int
+) -> None:
+    net = plain_file(FORK_NODES, FORK_EDGES, FORK_WAYS)
+
+    def job() -> list[float]:
+        world = World(load_scenario(scenario_file(tmp_path, net, FORKING), "ego"), tmp_path)
+        entry = world.await_ego((), lambda _: True)
+        route = RoadMap.load(net).route(entry.edges, entry.lane, entry.position, None, 100.0)
+        ego = world.adopt(entry, route, VehicleLimits())
+        stop = next(row for row, lane in enumerate(route.lane_ids) if lane.startswith(":")) + past
+        gaps = []
+        for station in np.minimum(ego.station() + 0.5 * np.arange(250), stop):
+            move = _to(route.line.poses(np.array([station]))[0].tolist(), ego.truth)
+            ego.vehicle.advance(ControlCommand(world.time, 0.0, 0.0, move), STEP)
+            world.advance()
+            objects, truth = world.observe(ego).objects, ego.truth
+            own = box_of(truth.x, truth.y, truth.heading, ego.shape)
+            gaps.append(float(distances(own, objects.boxes).min(initial=math.inf)))
+        return gaps
+
+    assert 0.5 < min(in_child(job)) < 5.0
+
+
+def _to(pose: Sequence[float], truth: EgoTruth) -> PoseStep:
+    """The step that takes an ego to `pose`: x, y, heading."""
+    x, y, heading = pose[0] - truth.x, pose[1] - truth.y, truth.heading
+    ahead, left = x * math.cos(heading) + y * math.sin(heading), y * math.cos(heading) - x * math.sin(heading)
+    return PoseStep(ahead, left, wrapped(pose[2] - heading), 0.0)
 
 
 @pytest.mark.parametrize("end", ["of its trip", "by SUMO"])
