@@ -59,19 +59,17 @@ class Ego:
         _, offset = line.place(*nose, between=(front - reach, front + reach))
         return self.route.lane_at(front, offset)
 
-    def straddled(self, lane: str) -> tuple[tuple[str, ...], tuple[str, str] | None]:
+    def straddled(self, lane: str) -> tuple[tuple[str, str], ...]:
         """Where it may be across more lanes than one, its front being on `lane`; nowhere while it is fast.
 
         Returns:
-            The route's lanes of roads under its ends; and its lane of the junction it is on, with that of the road it
-            has come by.
+            The route's lanes under its front and under its rear axle, each with the lane of a road by which the route
+            comes to it, if it is one of a junction, or "".
         """
         if self.truth.speed > SLOW:
-            return (), None
+            return ()
         rear = self.route.lane_ids[self.route.row_at(self.station())]
-        ends = tuple(dict.fromkeys((lane, rear)))
-        crossed = next(((end, self._origins[end]) for end in ends if end in self._origins), None)
-        return tuple(end for end in ends if not end.startswith(":")), crossed
+        return tuple((end, self._origins.get(end, "")) for end in (lane, rear))
 
     def occupied(self) -> float:
         """How much lane it takes up [m]: more than its length where it cuts the corner that the lanes drive out."""

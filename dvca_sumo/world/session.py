@@ -130,7 +130,7 @@ class Session:
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
         self._vehicles, self._people = _Readings(self._vehicle_now), _Readings(self._person_now)
         self._footing = Footing(self._walking_area)
-        self._inner: dict[str, list[Strip]] = {}  # lanes of vehicles on junctions
+        self._inner: dict[str, list[str]] = {}  # lanes of vehicles on junctions, by the beginning of their names
         self._adopted: dict[str, _Adopted] = {}  # by ego
         self._shadowed: set[str] = set()  # edges for which there is a route of a shadow
         self._ways: dict[str, list[list[str]]] = {}  # lanes of junctions, way by way, by the lane of a road
@@ -324,7 +324,7 @@ class Session:
         adopted, point, (middle, width) = self._adopted[ego], shapely.Point(x, y), self._middle(found)
         most = 0.5 * width - _HELD
         is_on_its_way = lane != found or middle.distance(point) > most
-        if is_on_its_way and lane.rpartition("_")[0] == found.rpartition("_")[0]:
+        if is_on_its_way and _edge_of(lane) == _edge_of(found):
             for next_to in _adjacent_lanes(found):
                 line, reach = self._middle(next_to)
                 front = line.project(point)
@@ -333,9 +333,7 @@ class Session:
                     return found, *within(x, y, middle, most)
         return lane, x, y
 
-    def straddle(
-        self, ego: str, truth: EgoTruth, shape: VehicleShape, lanes: Sequence[str], crossed: tuple[str, str] | None
-    ) -> None:
+    def straddle(self, ego: str, truth: EgoTruth, shape: VehicleShape, ends: Sequence[tuple[str, str]]) -> None:
         """Tell SUMO which lanes an ego is on beside the one where SUMO has it; effective with the next step.
 
         There a shadow stands for it, a vehicle that nobody sees but SUMO's drivers. The sub-lane model needs none.
@@ -344,11 +342,11 @@ class Session:
             ego: The vehicle.
             truth: How it moves now.
             shape: Its body.
-            lanes: The route's, of roads, under its ends; none: it is on no second one.
-            crossed: The route's lane of the junction it is on, and that of a road it has come by; None: it is on none.
+            ends: The route's lanes under its front and its rear, each with the lane of a road by which one comes to
+                it, where it is one of a junction; none: it is on no second lane.
         """
         adopted = self._adopted[ego]
-        parts = {} if self._has_sublanes else self._straddled(ego, truth, shape, lanes, crossed)
+        parts = {} if self._has_sublanes else self._straddled(ego, truth, shape, ends)
         for lane in adopted.shadows:
             if lane not in parts:
                 self._take_away(_shadow(ego, lane))
@@ -363,7 +361,7 @@ class Session:
         if not self.has(shadow):
             if edge not in self._shadowed:
                 self._shadowed.add(edge)
-                road = libsumo.lane.getLinks(lane)[0][_TO].rpartition("_")[0] if edge.startswith(":") else edge
+                road = _edge_of(libsumo.lane.getLinks(lane)[0][_TO]) if edge.startswith(":") else edge
                 libsumo.route.add(f"{SHADOW}.{edge}", [road])
             of.add(shadow, f"{SHADOW}.{edge}", SHADOW)
         middle, _ = self._middle(lane)
@@ -377,31 +375,59 @@ class Session:
             libsumo.vehicle.remove(shadow)
 
     def _straddled(
-        self, ego: str, truth: EgoTruth, shape: VehicleShape, lanes: Sequence[str], crossed: tuple[str, str] | None
+        self, ego: str, truth: EgoTruth, shape: VehicleShape, ends: Sequence[tuple[str, str]]
     ) -> dict[str, tuple[float, float]]:
         """Lanes that an ego is on, beside where SUMO has found it, and from where to where [m]."""
-        found, beside = libsumo.vehicle.getLaneID(ego), [] if crossed is None else self._other_ways(*crossed)
-        for lane in lanes:
+        found, beside = libsumo.vehicle.getLaneID(ego), list[str]()
+        for lane in dict.fromkeys(lane for lane, _ in ends if not lane.startswith(":")):
             near = _adjacent_lanes(lane)
             beside += [*near, lane] if found in near else near
+        if ends:
+            beside += self._beside_on_junctions(*ends)
         if not beside:
             return {}
         body, parts = outline(truth, shape), {}
         for lane in beside:
-            part = taken(body, *self._middle(lane)) if lane != found else None
+            if lane == found:
+                continue
+            part = taken(body, *self._middle(lane), is_inner=lane.startswith(":"))
             if part is not None and not self._is_occupied(lane, *part, ego):
                 parts[lane] = part
         return parts
 
-    def _other_ways(self, own: str, origin: str) -> list[str]:
-        """The lanes of a junction on other ways than `own` from the lane `origin` of a road, without turns back.
+    def _beside_on_junctions(self, front: tuple[str, str], rear: tuple[str, str]) -> list[str]:
+        """Lanes of junctions on which SUMO's drivers may not see an ego; both ends as in `straddle`.
 
-        Only lanes that come after another one of the junction: up to there SUMO's drivers see who is on the other ways.
+        They see who is on another way from their lane, but not from the second lane of that way on; and they take one
+        that has left a junction with its front to be gone, though its tail may still be in their way.
         """
-        if origin not in self._ways:
-            links = (link for link in libsumo.lane.getLinks(origin) if link[_DIRECTION] not in _TURNS_BACK)
-            self._ways[origin] = [_way_from(link[_VIA]) for link in links if link[_VIA]]
-        return [lane for way in self._ways[origin] if own not in way for lane in way[1:]]
+        lanes = list[str]()
+        (ahead, origin), (behind, entered) = front, rear
+        if origin:
+            ways = self._ways_from(origin)
+            own = next((way for way in ways if ahead in way), [ahead])
+            if ahead != own[0]:
+                lanes += [lane for way in ways if way is not own for lane in way[1:]]
+        if entered and _junction_of(behind) != _junction_of(ahead):
+            own = next((way for way in self._ways_from(entered) if behind in way), [behind])
+            edges = {_edge_of(lane) for lane in own}
+            lanes += [lane for lane in self._inner_lanes(_junction_of(behind)) if _edge_of(lane) not in edges]
+        return lanes
+
+    def _ways_from(self, lane: str) -> list[list[str]]:
+        """The lanes of a junction, way by way, by which one leaves a lane of a road, without turns back."""
+        if lane not in self._ways:
+            links = (link for link in libsumo.lane.getLinks(lane) if link[_DIRECTION] not in _TURNS_BACK)
+            self._ways[lane] = [_way_from(link[_VIA]) for link in links if link[_VIA]]
+        return self._ways[lane]
+
+    def _inner_lanes(self, junction: str) -> list[str]:
+        """The lanes of vehicles on a junction; all lanes are looked at once."""
+        if not self._inner:
+            for lane in libsumo.lane.getIDList():
+                if lane.startswith(":") and _edge_of(lane).rpartition("_")[2].isdecimal():
+                    self._inner.setdefault(_junction_of(lane), []).append(lane)
+        return self._inner.get(junction, [])
 
     def _is_occupied(self, lane: str, begin: float, end: float, ego: str) -> bool:
         """Whether somebody is on that part of a lane already: who is stopped beside an ego must not stay for ever."""
@@ -483,13 +509,9 @@ class Session:
 
     def _walking_area(self, edge: str) -> tuple[Shape, list[Strip]]:
         """The outline of a walking area, and the lanes of vehicles at its junction."""
-        of, junction = libsumo.lane, edge.rpartition("_")[0]
-        if not self._inner:
-            for lane in of.getIDList():
-                at, _, part = lane.rpartition("_")[0].rpartition("_")
-                if part.isdecimal() and "passenger" in (of.getAllowed(lane) or ("passenger",)):
-                    self._inner.setdefault(at, []).append((of.getShape(lane), of.getWidth(lane)))
-        return of.getShape(f"{edge}_0"), self._inner.get(junction, [])
+        of, lanes = libsumo.lane, self._inner_lanes(_edge_of(edge))
+        strips = [(of.getShape(lane), of.getWidth(lane)) for lane in lanes if _is_for_cars(lane)]
+        return of.getShape(f"{edge}_0"), strips
 
     def _middle(self, lane: str) -> tuple[shapely.LineString, float]:
         """A lane's centre line and width [m]."""
@@ -548,6 +570,19 @@ def _way_from(lane: str) -> list[str]:
     while onward := libsumo.lane.getLinks(way[-1])[0][_VIA]:
         way.append(onward)
     return way
+
+
+def _edge_of(lane: str) -> str:
+    return lane.rpartition("_")[0]
+
+
+def _junction_of(lane: str) -> str:
+    """The beginning of the names of all lanes of a junction that this one is of."""
+    return _edge_of(_edge_of(lane))
+
+
+def _is_for_cars(lane: str) -> bool:
+    return "passenger" in (libsumo.lane.getAllowed(lane) or ("passenger",))
 
 
 def _adjacent_lanes(lane: str) -> list[str]:

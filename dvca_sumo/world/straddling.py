@@ -13,7 +13,9 @@ from dvca_sumo.messages import VehicleShape
 from dvca_sumo.truth import EgoTruth
 
 SLOW = 5.0  # [m/s] above, an ego is on its way from one lane to the other, and soon on one
-_REACH = 0.4  # [m] into a lane: up to that, a car in its middle has room to pass
+_REACH = (
+    0.4  # [m] into a lane of a road: up to that, a car in its middle has room to pass; on a junction it cuts inside
+)
 _SHORTEST = 0.1  # [m] of a lane, less is nobody's way
 
 
@@ -22,12 +24,15 @@ def outline(truth: EgoTruth, shape: VehicleShape) -> shapely.Polygon:
     return shapely.Polygon(corners(box_of(truth.x, truth.y, truth.heading, shape)[None])[0])
 
 
-def taken(body: shapely.Polygon, middle: shapely.LineString, width: float) -> tuple[float, float] | None:
+def taken(
+    body: shapely.Polygon, middle: shapely.LineString, width: float, *, is_inner: bool = False
+) -> tuple[float, float] | None:
     """From where to where a body is in the way on a lane of `width` [m], along its centre line [m]; None: it is not.
 
+    `is_inner`: whether the lane is one of a junction.
     A body that is on what comes before the lane, too, begins at less than 0: as far back as it reaches.
     """
-    reach = max(0.5 * width - _REACH, 0.0)
+    reach = max(0.5 * width - (0.0 if is_inner else _REACH), 0.0)
     if body.distance(middle) >= reach:
         return None
     way = middle.buffer(reach, cap_style="flat", join_style="mitre")

@@ -37,6 +37,23 @@ FORK_WAYS = "".join(f'<connection from="ab" to="{to}" fromLane="0" toLane="0" co
 FORKING = """
 <trip id="ego" from="ab" to="bc" depart="0" departPos="150" departSpeed="0"/>
 <trip id="other" from="ab" to="bd" depart="4" departPos="100" departSpeed="8"/>"""
+# A side road joins another one aslant, two lanes each.
+MERGE_NODES = """
+<node id="n" x="-140" y="140"/><node id="w" x="-190" y="-60"/>
+<node id="b" x="0" y="0"/><node id="e" x="180" y="-84"/>"""
+MERGE_EDGES = "".join(
+    f'<edge id="{name}" from="{name[0]}" to="{name[1]}" speed="13.9" numLanes="2" priority="{priority}"/>'
+    for name, priority in (("nb", 9), ("be", 9), ("wb", 1))
+)
+MERGE_WAYS = "".join(
+    f'<connection from="{origin}" to="be" fromLane="{lane}" toLane="{lane}"/>'
+    for origin in ("nb", "wb")
+    for lane in (0, 1)
+)
+MERGING = """
+<trip id="ego" from="nb" to="be" depart="0" departPos="150" departLane="0" departSpeed="0"/>
+<trip id="other" from="wb" to="be" depart="5" departPos="150" departLane="1" departSpeed="3"/>"""
+FRONT = 4.1  # [m] of the ego's bumper ahead of its rear axle
 OUT, BACK = 15, 250  # steps after which it stands across the lanes, and goes back to its own
 ASIDE = 2.1  # [m] its front is over the edge then
 
@@ -106,13 +123,30 @@ def test_who_leaves_its_lane_by_a_way_beside_the_egos_stops_behind_it_on_the_jun
     tmp_path: Path, plain_file: Callable[..., Path], past: int
 ) -> None:
     net = plain_file(FORK_NODES, FORK_EDGES, FORK_WAYS)
+    assert 0.5 < min(_gaps_to_one_that_stops(tmp_path, net, FORKING, lambda lane: lane.startswith(":"), past)) < 5.0
+
+
+@pytest.mark.parametrize(("past", "stops"), [(1.0, True), (2.0, False)])  # [m] the front is beyond the junction
+def test_who_comes_by_another_way_stops_for_a_tail_that_is_still_on_the_junction_and_in_its_way(
+    tmp_path: Path, plain_file: Callable[..., Path], past: float, *, stops: bool
+) -> None:
+    net = plain_file(MERGE_NODES, MERGE_EDGES, MERGE_WAYS)
+    gaps = _gaps_to_one_that_stops(tmp_path, net, MERGING, lambda lane: lane == "be_0", past - FRONT)
+    assert min(gaps) > 0.3
+    assert (gaps[-1] < 5.0) is stops
+
+
+def _gaps_to_one_that_stops(
+    folder: Path, net: Path, traffic: str, is_there: Callable[[str], bool], past: float
+) -> list[float]:
+    """How far from an ego others are that stops so far [m] past the first of its lanes that is there."""
 
     def job() -> list[float]:
-        world = World(load_scenario(scenario_file(tmp_path, net, FORKING), "ego"), tmp_path)
+        world = World(load_scenario(scenario_file(folder, net, traffic), "ego"), folder)
         entry = world.await_ego((), lambda _: True)
         route = RoadMap.load(net).route(entry.edges, entry.lane, entry.position, None, 100.0)
         ego = world.adopt(entry, route, VehicleLimits())
-        stop = next(row for row, lane in enumerate(route.lane_ids) if lane.startswith(":")) + past
+        stop = next(row for row, lane in enumerate(route.lane_ids) if is_there(lane)) + past
         gaps = []
         for station in np.minimum(ego.station() + 0.5 * np.arange(250), stop):
             move = _to(route.line.poses(np.array([station]))[0].tolist(), ego.truth)
@@ -123,7 +157,7 @@ def test_who_leaves_its_lane_by_a_way_beside_the_egos_stops_behind_it_on_the_jun
             gaps.append(float(distances(own, objects.boxes).min(initial=math.inf)))
         return gaps
 
-    assert 0.5 < min(in_child(job)) < 5.0
+    return in_child(job)
 
 
 def _to(pose: Sequence[float], truth: EgoTruth) -> PoseStep:
