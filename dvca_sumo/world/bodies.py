@@ -12,6 +12,7 @@ from dvca_sumo.world.entry import Entry, departure
 from dvca_sumo.world.session import Motion
 from dvca_sumo.world.straddling import SLOW
 from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
+from dvca_sumo.world.ways import End, is_inner
 
 _SEARCHED = 10.0  # [m] along the route: nobody gets farther in a world step, and a route may come by again soon
 _SIDEWAYS = 0.3  # [m/s] is changing lanes
@@ -59,17 +60,15 @@ class Ego:
         _, offset = line.place(*nose, between=(front - reach, front + reach))
         return self.route.lane_at(front, offset)
 
-    def straddled(self, lane: str) -> tuple[tuple[str, str], ...]:
-        """Where it may be across more lanes than one, its front being on `lane`; nowhere while it is fast.
+    def straddled(self, lane: str) -> tuple[End, ...]:
+        """Where it may be across more lanes than one: its front, which is on `lane`, and its rear axle.
 
-        Returns:
-            The route's lanes under its front and under its rear axle, each with the lane of a road by which the route
-            comes to it, if it is one of a junction, or "".
+        Nowhere while it is fast.
         """
         if self.truth.speed > SLOW:
             return ()
         rear = self.route.lane_ids[self.route.row_at(self.station())]
-        return tuple((end, self._origins.get(end, "")) for end in (lane, rear))
+        return tuple(End(end, self._origins.get(end, "")) for end in (lane, rear))
 
     def occupied(self) -> float:
         """How much lane it takes up [m]: more than its length where it cuts the corner that the lanes drive out."""
@@ -164,7 +163,7 @@ def _origins(route: Route) -> dict[str, str]:
     """The lane of a road by which the route comes to each of its lanes of junctions."""
     origins, road = dict[str, str](), ""
     for lane in route.lane_ids:
-        if not lane.startswith(":"):
+        if not is_inner(lane):
             road = lane
         elif road:
             origins[lane] = road

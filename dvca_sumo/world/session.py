@@ -33,6 +33,7 @@ from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 from dvca_sumo.world.setback import Setback
 from dvca_sumo.world.signals import Signals
 from dvca_sumo.world.straddling import SLOW, outline, taken
+from dvca_sumo.world.ways import End, Link, Ways, edge_of, is_inner
 
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
 NEVER_TELEPORTED = "dvca.ego"  # vehicle type of an adopted ego
@@ -40,8 +41,6 @@ SHADOW = "dvca.shadow"  # vehicle type of what stands for an ego on a second lan
 
 # What is asked of who is near tells of which kind they are: the answers for both arrive in one dictionary, by id.
 _VEHICLE, _PERSON = tc.VAR_SPEED, tc.VAR_ANGLE
-_TO, _VIA, _DIRECTION = 0, 4, 6  # of a link: the lane of a road that it leads to, the first one of the junction
-_TURNS_BACK = ("t", "T")
 _NOWHERE = 1e8  # [m] a teleporting vehicle's coordinates are beyond
 _ANY_BRAKING = 1e4  # [m/s^2] SUMO's own driver, overruled, would warn of braking for the arrival at every step
 _MATCHED_WITHIN = 30.0  # [m] of a lane an ego is on the road; SUMO looks at every lane within that
@@ -130,10 +129,9 @@ class Session:
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
         self._vehicles, self._people = _Readings(self._vehicle_now), _Readings(self._person_now)
         self._footing = Footing(self._walking_area)
-        self._inner: dict[str, list[str]] = {}  # lanes of vehicles on junctions, by the beginning of their names
         self._adopted: dict[str, _Adopted] = {}  # by ego
         self._shadowed: set[str] = set()  # edges for which there is a route of a shadow
-        self._ways: dict[str, list[list[str]]] = {}  # lanes of junctions, way by way, by the lane of a road
+        self._ways = Ways(_links_of, libsumo.lane.getIDList)
         self._has_sublanes = float(libsumo.simulation.getOption("lateral-resolution")) > 0.0
         self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
@@ -324,7 +322,7 @@ class Session:
         adopted, point, (middle, width) = self._adopted[ego], shapely.Point(x, y), self._middle(found)
         most = 0.5 * width - _HELD
         is_on_its_way = lane != found or middle.distance(point) > most
-        if is_on_its_way and _edge_of(lane) == _edge_of(found):
+        if is_on_its_way and edge_of(lane) == edge_of(found):
             for next_to in _adjacent_lanes(found):
                 line, reach = self._middle(next_to)
                 front = line.project(point)
@@ -333,7 +331,7 @@ class Session:
                     return found, *within(x, y, middle, most)
         return lane, x, y
 
-    def straddle(self, ego: str, truth: EgoTruth, shape: VehicleShape, ends: Sequence[tuple[str, str]]) -> None:
+    def straddle(self, ego: str, truth: EgoTruth, shape: VehicleShape, ends: Sequence[End]) -> None:
         """Tell SUMO which lanes an ego is on beside the one where SUMO has it; effective with the next step.
 
         There a shadow stands for it, a vehicle that nobody sees but SUMO's drivers. The sub-lane model needs none.
@@ -342,8 +340,7 @@ class Session:
             ego: The vehicle.
             truth: How it moves now.
             shape: Its body.
-            ends: The route's lanes under its front and its rear, each with the lane of a road by which one comes to
-                it, where it is one of a junction; none: it is on no second lane.
+            ends: Where its front and its rear axle are on its route; none: it is on no second lane.
         """
         adopted = self._adopted[ego]
         parts = {} if self._has_sublanes else self._straddled(ego, truth, shape, ends)
@@ -361,7 +358,7 @@ class Session:
         if not self.has(shadow):
             if edge not in self._shadowed:
                 self._shadowed.add(edge)
-                road = _edge_of(libsumo.lane.getLinks(lane)[0][_TO]) if edge.startswith(":") else edge
+                road = self._ways.road_after(lane) if is_inner(lane) else edge
                 libsumo.route.add(f"{SHADOW}.{edge}", [road])
             of.add(shadow, f"{SHADOW}.{edge}", SHADOW)
         middle, _ = self._middle(lane)
@@ -375,59 +372,25 @@ class Session:
             libsumo.vehicle.remove(shadow)
 
     def _straddled(
-        self, ego: str, truth: EgoTruth, shape: VehicleShape, ends: Sequence[tuple[str, str]]
+        self, ego: str, truth: EgoTruth, shape: VehicleShape, ends: Sequence[End]
     ) -> dict[str, tuple[float, float]]:
         """Lanes that an ego is on, beside where SUMO has found it, and from where to where [m]."""
         found, beside = libsumo.vehicle.getLaneID(ego), list[str]()
-        for lane in dict.fromkeys(lane for lane, _ in ends if not lane.startswith(":")):
+        for lane in dict.fromkeys(end.lane for end in ends if not end.origin):
             near = _adjacent_lanes(lane)
             beside += [*near, lane] if found in near else near
         if ends:
-            beside += self._beside_on_junctions(*ends)
+            beside += self._ways.beside(*ends)
         if not beside:
             return {}
         body, parts = outline(truth, shape), {}
         for lane in beside:
             if lane == found:
                 continue
-            part = taken(body, *self._middle(lane), is_inner=lane.startswith(":"))
+            part = taken(body, *self._middle(lane), is_inner=is_inner(lane))
             if part is not None and not self._is_occupied(lane, *part, ego):
                 parts[lane] = part
         return parts
-
-    def _beside_on_junctions(self, front: tuple[str, str], rear: tuple[str, str]) -> list[str]:
-        """Lanes of junctions on which SUMO's drivers may not see an ego; both ends as in `straddle`.
-
-        They see who is on another way from their lane, but not from the second lane of that way on; and they take one
-        that has left a junction with its front to be gone, though its tail may still be in their way.
-        """
-        lanes = list[str]()
-        (ahead, origin), (behind, entered) = front, rear
-        if origin:
-            ways = self._ways_from(origin)
-            own = next((way for way in ways if ahead in way), [ahead])
-            if ahead != own[0]:
-                lanes += [lane for way in ways if way is not own for lane in way[1:]]
-        if entered and _junction_of(behind) != _junction_of(ahead):
-            own = next((way for way in self._ways_from(entered) if behind in way), [behind])
-            edges = {_edge_of(lane) for lane in own}
-            lanes += [lane for lane in self._inner_lanes(_junction_of(behind)) if _edge_of(lane) not in edges]
-        return lanes
-
-    def _ways_from(self, lane: str) -> list[list[str]]:
-        """The lanes of a junction, way by way, by which one leaves a lane of a road, without turns back."""
-        if lane not in self._ways:
-            links = (link for link in libsumo.lane.getLinks(lane) if link[_DIRECTION] not in _TURNS_BACK)
-            self._ways[lane] = [_way_from(link[_VIA]) for link in links if link[_VIA]]
-        return self._ways[lane]
-
-    def _inner_lanes(self, junction: str) -> list[str]:
-        """The lanes of vehicles on a junction; all lanes are looked at once."""
-        if not self._inner:
-            for lane in libsumo.lane.getIDList():
-                if lane.startswith(":") and _edge_of(lane).rpartition("_")[2].isdecimal():
-                    self._inner.setdefault(_junction_of(lane), []).append(lane)
-        return self._inner.get(junction, [])
 
     def _is_occupied(self, lane: str, begin: float, end: float, ego: str) -> bool:
         """Whether somebody is on that part of a lane already: who is stopped beside an ego must not stay for ever."""
@@ -509,7 +472,7 @@ class Session:
 
     def _walking_area(self, edge: str) -> tuple[Shape, list[Strip]]:
         """The outline of a walking area, and the lanes of vehicles at its junction."""
-        of, lanes = libsumo.lane, self._inner_lanes(_edge_of(edge))
+        of, lanes = libsumo.lane, self._ways.inner_lanes(edge_of(edge))
         strips = [(of.getShape(lane), of.getWidth(lane)) for lane in lanes if _is_for_cars(lane)]
         return of.getShape(f"{edge}_0"), strips
 
@@ -524,7 +487,7 @@ class Session:
     def _remind(self, ego: str, lane: str) -> None:
         """Tell SUMO the rest of an ego's trip again, as soon as it sees it, on `lane`, on the way."""
         of, row = libsumo.vehicle, libsumo.vehicle.getRouteIndex(ego)
-        is_between = lane.startswith(":")
+        is_between = is_inner(lane)
         itinerary = self._adopted[ego].itinerary
         onward = itinerary.onward(of.getRoute(ego)[row : row + 1 + is_between])
         if onward:
@@ -564,21 +527,8 @@ class Session:
         return key
 
 
-def _way_from(lane: str) -> list[str]:
-    """The lanes of a junction from this one on."""
-    way = [lane]
-    while onward := libsumo.lane.getLinks(way[-1])[0][_VIA]:
-        way.append(onward)
-    return way
-
-
-def _edge_of(lane: str) -> str:
-    return lane.rpartition("_")[0]
-
-
-def _junction_of(lane: str) -> str:
-    """The beginning of the names of all lanes of a junction that this one is of."""
-    return _edge_of(_edge_of(lane))
+def _links_of(lane: str) -> list[Link]:
+    return [Link(to, via, way) for to, _, _, _, via, _, way, _ in libsumo.lane.getLinks(lane)]
 
 
 def _is_for_cars(lane: str) -> bool:

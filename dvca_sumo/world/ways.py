@@ -1,0 +1,92 @@
+"""Ways across junctions, and on which of their lanes SUMO's drivers do not see who is beside them.
+
+SUMO names a lane after its edge, and the edge of a junction's lane after the junction: ":78_12_0".
+"""
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+_TURNS_BACK = ("t", "T")
+
+
+class Link(NamedTuple):
+    """How one gets from a lane to a lane of a road."""
+
+    to: str
+    via: str  # the next lane of the junction on the way there, "" where there is none
+    direction: str  # SUMO's letter
+
+
+class End(NamedTuple):
+    """Where an end of a body is on its route."""
+
+    lane: str
+    origin: str  # the lane of a road by which the route comes to `lane`, if that is one of a junction; else ""
+
+
+class Ways:
+    """The ways of one net, found when first asked for."""
+
+    def __init__(self, links: Callable[[str], Iterable[Link]], lanes: Callable[[], Iterable[str]]) -> None:
+        """`links` tells those of a lane, `lanes` the names of all lanes."""
+        self._links = links
+        self._lanes = lanes
+        self._ways: dict[str, list[list[str]]] = {}  # by lane of a road
+        self._inner: dict[str, list[str]] = {}  # lanes by junction
+
+    def beside(self, front: End, rear: End) -> list[str]:
+        """Lanes of junctions on which SUMO's drivers may not see a body with these ends.
+
+        They see who is on another way from their lane, but not from the second lane of that way on; and they take one
+        that has left a junction with its front to be gone, though its tail may still be in their way.
+        """
+        lanes = list[str]()
+        if front.origin:
+            ways = self._ways_from(front.origin)
+            own = next((way for way in ways if front.lane in way), [front.lane])
+            if front.lane != own[0]:
+                lanes += [lane for way in ways if way is not own for lane in way[1:]]
+        if rear.origin and _junction_of(rear.lane) != _junction_of(front.lane):
+            own = next((way for way in self._ways_from(rear.origin) if rear.lane in way), [rear.lane])
+            edges = {edge_of(lane) for lane in own}
+            lanes += [lane for lane in self.inner_lanes(_junction_of(rear.lane)) if edge_of(lane) not in edges]
+        return lanes
+
+    def inner_lanes(self, junction: str) -> list[str]:
+        """The lanes of vehicles on a junction, by the beginning of their names."""
+        if not self._inner:
+            for lane in self._lanes():
+                if is_inner(lane) and edge_of(lane).rpartition("_")[2].isdecimal():
+                    self._inner.setdefault(_junction_of(lane), []).append(lane)
+        return self._inner.get(junction, [])
+
+    def road_after(self, lane: str) -> str:
+        """The edge of a road that a lane of a junction leads to."""
+        return edge_of(next(iter(self._links(lane))).to)
+
+    def _ways_from(self, lane: str) -> list[list[str]]:
+        """The lanes of a junction, way by way, by which one leaves a lane of a road, without turns back."""
+        if lane not in self._ways:
+            links = (link for link in self._links(lane) if link.via and link.direction not in _TURNS_BACK)
+            self._ways[lane] = [self._way_by(link.via) for link in links]
+        return self._ways[lane]
+
+    def _way_by(self, lane: str) -> list[str]:
+        way = [lane]
+        while onward := next(iter(self._links(way[-1]))).via:
+            way.append(onward)
+        return way
+
+
+def is_inner(lane: str) -> bool:
+    """Whether a lane is one of a junction."""
+    return lane.startswith(":")
+
+
+def edge_of(lane: str) -> str:
+    """The edge of a lane."""
+    return lane.rpartition("_")[0]
+
+
+def _junction_of(lane: str) -> str:
+    return edge_of(edge_of(lane))
