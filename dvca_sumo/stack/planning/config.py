@@ -82,8 +82,8 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     passing_gain: float = 2.0  # [m/s] one gets on faster there
     passing_slowest: float = 8.0  # [m/s] slower ones are a queue, may be one for where the ego goes
     passing_outlook: float = 8.0  # [s] in which one would be caught up with
-    passing_room: float = 12.0  # [s] at the speed wanted, that there is still room to come back
-    return_room: float = 10.0  # [s] of room left, from where on the ego comes back
+    passing_room: float = 12.0  # [s] at the speed wanted, that there is still room to pass somebody
+    return_room: float = 10.0  # [s] of room left, from where on the ego comes back to its own lane, if it has to
 
     # Whose turn it is.
     likely: float = 0.15  # probability from which a hypothesis counts: that of a turn at most junctions

@@ -62,6 +62,8 @@ class Passing:
         wanted = float(cruise_speeds(window.speed_limits[BEHIND], config))
         halt = min((begin for begin, end in way.junctions if end > nose), default=way.latest_station)
         is_short = halt - nose < config.passing_room * wanted
+        if not leads_on:
+            is_short |= way.latest_station - nose < (config.passing_room + config.return_room) * wanted
         if self._lane == self._target == _OWN and is_short:
             return None
         aside = np.abs(offset - way.centres(np.array([window.station]))[:, 0])

@@ -129,12 +129,20 @@ def test_beside_dense_traffic_it_slows_down_in_time_for_a_gap_past_the_queue() -
 
 
 def test_it_comes_back_before_its_lane_to_pass_on_ends() -> None:
-    slow = [car(7, 80.0, speed=10.0), car(8, 100.0, speed=10.0)]
-    driven = drive(beside(end=400.0, leads_on=False), 60.0, speed=13.0, actors=slow)
+    slow = [car(7, 80.0, speed=10.0), car(8, 110.0, speed=10.0)]
+    driven = drive(beside(end=500.0, leads_on=False), 60.0, speed=13.0, actors=slow)
     assert lanes(driven) == [0, 1, 0]
     over = driven.fronts[np.abs(driven.states[:, 2]) > 0.5 * WIDTH]
-    assert over.max() < 400.0
+    assert over.max() < 500.0
     assert driven.clearances.min() > 1.0
+
+
+@pytest.mark.parametrize(("leads_on", "expected"), [(True, [0, 1, 0]), (False, [0])])
+def test_where_the_ego_has_to_come_back_there_has_to_be_room_for_that_too(
+    *, leads_on: bool, expected: list[int]
+) -> None:
+    driven = drive(beside(end=290.0, leads_on=leads_on), 60.0, speed=13.0, actors=[car(7, 80.0, speed=9.0)])
+    assert lanes(driven) == expected
 
 
 def test_nobody_is_passed_shortly_before_a_junction() -> None:
