@@ -13,9 +13,7 @@ from dvca_sumo.messages import VehicleShape
 from dvca_sumo.truth import EgoTruth
 
 SLOW = 5.0  # [m/s] above, an ego is on its way from one lane to the other, and soon on one
-_REACH = (
-    0.4  # [m] into a lane of a road: up to that, a car in its middle has room to pass; on a junction it cuts inside
-)
+_REACH = 0.4  # [m] into a lane of a road: up to that, a car in its middle has room to pass; on junctions it cuts bends
 _SHORTEST = 0.1  # [m] of a lane, less is nobody's way
 
 
