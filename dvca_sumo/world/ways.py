@@ -73,7 +73,7 @@ class Ways:
 
     def _way_by(self, lane: str) -> list[str]:
         way = [lane]
-        while onward := next(iter(self._links(way[-1]))).via:
+        while onward := next((link.via for link in self._links(way[-1])), ""):
             way.append(onward)
         return way
 

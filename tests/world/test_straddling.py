@@ -16,8 +16,8 @@ from dvca_sumo.geometry.boxes import box_of, distances
 from dvca_sumo.messages import ControlCommand, PoseStep
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.scenario import load_scenario
-from dvca_sumo.truth import EgoTruth
-from dvca_sumo.world import VehicleLimits, World
+from dvca_sumo.truth import EgoTruth, ObjectsTruth
+from dvca_sumo.world import Ego, VehicleLimits, World
 from dvca_sumo.world.straddling import taken
 
 NODES = '<node id="b" x="0" y="0"/><node id="c" x="300" y="0"/>'
@@ -53,7 +53,6 @@ MERGE_WAYS = "".join(
 MERGING = """
 <trip id="ego" from="nb" to="be" depart="0" departPos="150" departLane="0" departSpeed="0"/>
 <trip id="other" from="wb" to="be" depart="5" departPos="150" departLane="1" departSpeed="3"/>"""
-FRONT = 4.1  # [m] of the ego's bumper ahead of its rear axle
 OUT, BACK = 15, 250  # steps after which it stands across the lanes, and goes back to its own
 ASIDE = 2.1  # [m] its front is over the edge then
 
@@ -77,9 +76,8 @@ class Drive:
             move = PoseStep(0.1 * (left != 0.0), left, 0.0, 0.0)
             self.ego.vehicle.advance(ControlCommand(self.world.time, 0.0, 0.0, move), STEP)
             self.world.advance()
-            objects, truth = self.world.observe(self.ego).objects, self.ego.truth
-            own = box_of(truth.x, truth.y, truth.heading, self.ego.shape)
-            self.gaps.append(float(distances(own, objects.boxes).min(initial=math.inf)))
+            objects = self.world.observe(self.ego).objects
+            self.gaps.append(_gap(self.ego, objects))
             self.names |= {*objects.ids, *self.world.departed(), *self.world.waits()}
 
 
@@ -118,9 +116,9 @@ def test_who_comes_over_the_junction_stops_behind_the_rear_of_an_ego_that_is_sti
     assert 0.5 < min(in_child(job)) < 5.0
 
 
-@pytest.mark.parametrize("past", [1, 4, 9, 13])  # [m] the rear axle is beyond the stop line
+@pytest.mark.parametrize("past", [5.0, 8.0, 13.0, 17.0])  # [m] the front is beyond the stop line
 def test_who_leaves_its_lane_by_a_way_beside_the_egos_stops_behind_it_on_the_junction(
-    tmp_path: Path, plain_file: Callable[..., Path], past: int
+    tmp_path: Path, plain_file: Callable[..., Path], past: float
 ) -> None:
     net = plain_file(FORK_NODES, FORK_EDGES, FORK_WAYS)
     assert 0.5 < min(_gaps_to_one_that_stops(tmp_path, net, FORKING, lambda lane: lane.startswith(":"), past)) < 5.0
@@ -131,7 +129,7 @@ def test_who_comes_by_another_way_stops_for_a_tail_that_is_still_on_the_junction
     tmp_path: Path, plain_file: Callable[..., Path], past: float, *, stops: bool
 ) -> None:
     net = plain_file(MERGE_NODES, MERGE_EDGES, MERGE_WAYS)
-    gaps = _gaps_to_one_that_stops(tmp_path, net, MERGING, lambda lane: lane == "be_0", past - FRONT)
+    gaps = _gaps_to_one_that_stops(tmp_path, net, MERGING, lambda lane: lane == "be_0", past)
     assert min(gaps) > 0.3
     assert (gaps[-1] < 5.0) is stops
 
@@ -139,25 +137,30 @@ def test_who_comes_by_another_way_stops_for_a_tail_that_is_still_on_the_junction
 def _gaps_to_one_that_stops(
     folder: Path, net: Path, traffic: str, is_there: Callable[[str], bool], past: float
 ) -> list[float]:
-    """How far from an ego others are that stops so far [m] past the first of its lanes that is there."""
+    """How far from an ego others are whose front stops so far [m] past the first of its lanes that is there."""
 
     def job() -> list[float]:
         world = World(load_scenario(scenario_file(folder, net, traffic), "ego"), folder)
         entry = world.await_ego((), lambda _: True)
         route = RoadMap.load(net).route(entry.edges, entry.lane, entry.position, None, 100.0)
         ego = world.adopt(entry, route, VehicleLimits())
-        stop = next(row for row, lane in enumerate(route.lane_ids) if is_there(lane)) + past
+        stop = next(row for row, lane in enumerate(route.lane_ids) if is_there(lane)) + past - ego.shape.front
         gaps = []
         for station in np.minimum(ego.station() + 0.5 * np.arange(250), stop):
             move = _to(route.line.poses(np.array([station]))[0].tolist(), ego.truth)
             ego.vehicle.advance(ControlCommand(world.time, 0.0, 0.0, move), STEP)
             world.advance()
-            objects, truth = world.observe(ego).objects, ego.truth
-            own = box_of(truth.x, truth.y, truth.heading, ego.shape)
-            gaps.append(float(distances(own, objects.boxes).min(initial=math.inf)))
+            gaps.append(_gap(ego, world.observe(ego).objects))
         return gaps
 
     return in_child(job)
+
+
+def _gap(ego: Ego, others: ObjectsTruth) -> float:
+    """From an ego to the nearest of the others [m]."""
+    truth = ego.truth
+    own = box_of(truth.x, truth.y, truth.heading, ego.shape)
+    return float(distances(own, others.boxes).min(initial=math.inf))
 
 
 def _to(pose: Sequence[float], truth: EgoTruth) -> PoseStep:
