@@ -131,7 +131,7 @@ class Session:
         self._footing = Footing(self._walking_area)
         self._adopted: dict[str, _Adopted] = {}  # by ego
         self._shadowed: set[str] = set()  # edges for which there is a route of a shadow
-        self._ways = Ways(_links_of, libsumo.lane.getIDList)
+        self._ways = Ways(_links_of, libsumo.lane.getInternalFoes, libsumo.lane.getIDList)
         self._has_sublanes = float(libsumo.simulation.getOption("lateral-resolution")) > 0.0
         self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
@@ -528,7 +528,7 @@ class Session:
 
 
 def _links_of(lane: str) -> list[Link]:
-    return [Link(to, via, way) for to, _, _, _, via, _, way, _ in libsumo.lane.getLinks(lane)]
+    return [Link(to, via) for to, _, _, _, via, _, _, _ in libsumo.lane.getLinks(lane)]
 
 
 def _is_for_cars(lane: str) -> bool:

@@ -3,10 +3,8 @@
 SUMO names a lane after its edge, and the edge of a junction's lane after the junction: ":78_12_0".
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import NamedTuple
-
-_TURNS_BACK = ("t", "T")
 
 
 class Link(NamedTuple):
@@ -14,7 +12,6 @@ class Link(NamedTuple):
 
     to: str
     via: str  # the next lane of the junction on the way there, "" where there is none
-    direction: str  # SUMO's letter
 
 
 class End(NamedTuple):
@@ -27,28 +24,32 @@ class End(NamedTuple):
 class Ways:
     """The ways of one net, found when first asked for."""
 
-    def __init__(self, links: Callable[[str], Iterable[Link]], lanes: Callable[[], Iterable[str]]) -> None:
-        """`links` tells those of a lane, `lanes` the names of all lanes."""
+    def __init__(
+        self,
+        links: Callable[[str], Iterable[Link]],
+        foes: Callable[[str], Collection[str]],
+        lanes: Callable[[], Iterable[str]],
+    ) -> None:
+        """`links` tells those of a lane, `foes` whom one on a lane of a junction minds, `lanes` the names of all."""
         self._links = links
+        self._foes = foes
         self._lanes = lanes
         self._ways: dict[str, list[list[str]]] = {}  # by lane of a road
         self._inner: dict[str, list[str]] = {}  # lanes by junction
+        self._blind: dict[End, list[str]] = {}
 
     def beside(self, front: End, rear: End) -> list[str]:
         """Lanes of junctions on which SUMO's drivers may not see a body with these ends.
 
-        They see who is on another way from their lane, but not from the second lane of that way on; and they take one
-        that has left a junction with its front to be gone, though its tail may still be in their way.
+        They see who is on a way that touches theirs as the net has it, or is another one from their lane, up to its
+        second lane; and they take one that has left a junction with its front to be gone, though its tail may still be
+        in their way.
         """
         lanes = list[str]()
         if front.origin:
-            ways = self._ways_from(front.origin)
-            own = next((way for way in ways if front.lane in way), [front.lane])
-            if front.lane != own[0]:
-                lanes += [lane for way in ways if way is not own for lane in way[1:]]
+            lanes += self._blind_to(front)
         if rear.origin and _junction_of(rear.lane) != _junction_of(front.lane):
-            own = next((way for way in self._ways_from(rear.origin) if rear.lane in way), [rear.lane])
-            edges = {edge_of(lane) for lane in own}
+            edges = {edge_of(lane) for lane in self._way_of(rear)}
             lanes += [lane for lane in self.inner_lanes(_junction_of(rear.lane)) if edge_of(lane) not in edges]
         return lanes
 
@@ -64,11 +65,22 @@ class Ways:
         """The edge of a road that a lane of a junction leads to."""
         return edge_of(next(iter(self._links(lane))).to)
 
+    def _blind_to(self, front: End) -> list[str]:
+        """The lanes of a junction from which drivers do not look at that lane of it."""
+        if front not in self._blind:
+            seeing = {*self._way_of(front), *(way[0] for way in self._ways_from(front.origin))}
+            others = (lane for lane in self.inner_lanes(_junction_of(front.lane)) if lane not in seeing)
+            self._blind[front] = [lane for lane in others if front.lane not in self._foes(lane)]
+        return self._blind[front]
+
+    def _way_of(self, end: End) -> list[str]:
+        """All lanes of a junction on the way that an end is on."""
+        return next((way for way in self._ways_from(end.origin) if end.lane in way), [end.lane])
+
     def _ways_from(self, lane: str) -> list[list[str]]:
-        """The lanes of a junction, way by way, by which one leaves a lane of a road, without turns back."""
+        """The lanes of a junction, way by way, by which one leaves a lane of a road."""
         if lane not in self._ways:
-            links = (link for link in self._links(lane) if link.via and link.direction not in _TURNS_BACK)
-            self._ways[lane] = [self._way_by(link.via) for link in links]
+            self._ways[lane] = [self._way_by(link.via) for link in self._links(lane) if link.via]
         return self._ways[lane]
 
     def _way_by(self, lane: str) -> list[str]:

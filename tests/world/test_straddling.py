@@ -53,6 +53,17 @@ MERGE_WAYS = "".join(
 MERGING = """
 <trip id="ego" from="nb" to="be" depart="0" departPos="150" departLane="0" departSpeed="0"/>
 <trip id="other" from="wb" to="be" depart="5" departPos="150" departLane="1" departSpeed="3"/>"""
+# A road of two lanes crosses a wide one, and leads straight on.
+CROSS_NODES = """
+<node id="a" x="-200" y="0"/><node id="b" x="0" y="0"/><node id="c" x="200" y="0"/>
+<node id="n" x="0" y="200"/><node id="s" x="0" y="-200"/>"""
+CROSS_EDGES = "".join(
+    f'<edge id="{name}" from="{name[0]}" to="{name[1]}" speed="13.9" numLanes="{lanes}" priority="{priority}"/>'
+    for name, lanes, priority in (("ab", 2, 9), ("bc", 2, 9), ("nb", 5, 1), ("bs", 5, 1))
+)
+CROSSING = """
+<trip id="ego" from="ab" to="bc" depart="0" departPos="150" departLane="0" departSpeed="0"/>
+<trip id="other" from="ab" to="bc" depart="4" departPos="100" departLane="1" departSpeed="8"/>"""
 OUT, BACK = 15, 250  # steps after which it stands across the lanes, and goes back to its own
 ASIDE = 2.1  # [m] its front is over the edge then
 
@@ -124,6 +135,16 @@ def test_who_leaves_its_lane_by_a_way_beside_the_egos_stops_behind_it_on_the_jun
     assert 0.5 < min(_gaps_to_one_that_stops(tmp_path, net, FORKING, lambda lane: lane.startswith(":"), past)) < 5.0
 
 
+@pytest.mark.parametrize(("aside", "stops"), [(1.5, True), (0.5, False)])  # [m] to the left of its lane's middle
+def test_who_comes_from_the_lane_beside_stops_on_the_junction_behind_an_ego_that_is_in_its_way(
+    tmp_path: Path, plain_file: Callable[..., Path], aside: float, *, stops: bool
+) -> None:
+    net = plain_file(CROSS_NODES, CROSS_EDGES)
+    gaps = _gaps_to_one_that_stops(tmp_path, net, CROSSING, lambda lane: lane.startswith(":"), 11.0, aside)
+    assert min(gaps) > 0.3
+    assert (gaps[-1] < 5.0) is stops
+
+
 @pytest.mark.parametrize(("past", "stops"), [(1.0, True), (2.0, False)])  # [m] the front is beyond the junction
 def test_who_comes_by_another_way_stops_for_a_tail_that_is_still_on_the_junction_and_in_its_way(
     tmp_path: Path, plain_file: Callable[..., Path], past: float, *, stops: bool
@@ -135,9 +156,12 @@ def test_who_comes_by_another_way_stops_for_a_tail_that_is_still_on_the_junction
 
 
 def _gaps_to_one_that_stops(
-    folder: Path, net: Path, traffic: str, is_there: Callable[[str], bool], past: float
+    folder: Path, net: Path, traffic: str, is_there: Callable[[str], bool], past: float, aside: float = 0.0
 ) -> list[float]:
-    """How far from an ego others are whose front stops so far [m] past the first of its lanes that is there."""
+    """How far others are from an ego whose front stops so far [m] past the first of its lanes that is there.
+
+    It is `aside` [m] of their middle, to the left.
+    """
 
     def job() -> list[float]:
         world = World(load_scenario(scenario_file(folder, net, traffic), "ego"), folder)
@@ -147,7 +171,7 @@ def _gaps_to_one_that_stops(
         stop = next(row for row, lane in enumerate(route.lane_ids) if is_there(lane)) + past - ego.shape.front
         gaps = []
         for station in np.minimum(ego.station() + 0.5 * np.arange(250), stop):
-            move = _to(route.line.poses(np.array([station]))[0].tolist(), ego.truth)
+            move = _to(route.line.poses(np.array([station]), aside)[0].tolist(), ego.truth)
             ego.vehicle.advance(ControlCommand(world.time, 0.0, 0.0, move), STEP)
             world.advance()
             gaps.append(_gap(ego, world.observe(ego).objects))

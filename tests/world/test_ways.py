@@ -6,44 +6,49 @@ from dvca_sumo.world.ways import End, Link, Ways, edge_of, is_inner
 
 LINKS = {
     "in_0": [
-        Link("left_0", ":c_0_0", "l"),
-        Link("on_0", ":c_1_0", "s"),
-        Link("right_0", ":c_2_0", "r"),
-        Link("back_0", ":c_3_0", "t"),
+        Link("left_0", ":c_0_0"),
+        Link("on_0", ":c_1_0"),
+        Link("right_0", ":c_2_0"),
+        Link("back_0", ":c_3_0"),
     ],
-    "in_1": [Link("on_1", ":c_1_1", "s")],
-    ":c_0_0": [Link("left_0", ":c_4_0", "l")],
-    ":c_2_0": [Link("right_0", ":c_5_0", "r")],
-    ":c_3_0": [Link("back_0", ":c_6_0", "t")],
-    ":c_1_0": [Link("on_0", "", "s")],
-    ":c_1_1": [Link("on_1", "", "s")],
-    ":c_4_0": [Link("left_0", "", "l")],
-    ":c_5_0": [Link("right_0", "", "r")],
-    ":c_6_0": [Link("back_0", "", "t")],
+    "in_1": [Link("on_1", ":c_1_1")],
+    ":c_0_0": [Link("left_0", ":c_4_0")],
+    ":c_2_0": [Link("right_0", ":c_5_0")],
+    ":c_3_0": [Link("back_0", ":c_6_0")],
+    ":c_1_0": [Link("on_0", "")],
+    ":c_1_1": [Link("on_1", "")],
+    ":c_4_0": [Link("left_0", "")],
+    ":c_5_0": [Link("right_0", "")],
+    ":c_6_0": [Link("back_0", "")],
 }
+# Whom who turns left minds, and who minds it, as far as the net has it.
+FOES = {":c_4_0": (":c_1_1", ":c_7_0"), ":c_1_1": (":c_4_0",), ":c_7_0": (":c_4_0",)}
 ON_ROAD = End("in_0", "")
 
 
 @pytest.fixture
 def ways() -> Ways:
-    return Ways(lambda lane: LINKS.get(lane, []), lambda: [*LINKS, ":c_c0_0", ":c_w0_0", ":d_0_0", "left_0"])
+    lanes = [*LINKS, ":c_7_0", ":c_c0_0", ":c_w0_0", ":d_0_0", "left_0"]
+    return Ways(lambda lane: LINKS.get(lane, []), lambda lane: FOES.get(lane, ()), lambda: lanes)
 
 
-def test_up_to_the_place_to_wait_at_all_are_seen(ways: Ways) -> None:
-    for lane in (":c_0_0", ":c_1_0", ":c_3_0"):
-        assert ways.beside(End(lane, "in_0"), ON_ROAD) == []
+def test_who_leaves_the_same_lane_sees_one_up_to_its_second_lane(ways: Ways) -> None:
+    for lane in (":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0"):
+        assert not {":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0"} & {*ways.beside(End(lane, "in_0"), ON_ROAD)}
     assert ways.beside(ON_ROAD, ON_ROAD) == []
 
 
-def test_past_it_one_may_be_on_the_later_lanes_of_other_ways_that_do_not_turn_back(ways: Ways) -> None:
+def test_who_is_on_another_way_sees_one_on_a_lane_that_touches_it_in_the_net(ways: Ways) -> None:
     for rear in (ON_ROAD, End(":c_0_0", "in_0"), End(":c_4_0", "in_0")):
-        assert ways.beside(End(":c_4_0", "in_0"), rear) == [":c_5_0"]
-    assert ways.beside(End(":c_6_0", "in_0"), ON_ROAD) == []
+        assert ways.beside(End(":c_4_0", "in_0"), rear) == [":c_5_0", ":c_6_0"]
+    assert ways.beside(End(":c_0_0", "in_0"), ON_ROAD) == [":c_1_1", ":c_5_0", ":c_6_0", ":c_7_0"]
+    of_all = {":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0", ":c_5_0", ":c_6_0", ":c_7_0"}
+    assert {*ways.beside(End(":c_1_1", "in_1"), ON_ROAD)} == of_all
 
 
 def test_a_tail_may_be_on_all_lanes_of_vehicles_on_the_junction_but_its_own_and_those_next_to_it(ways: Ways) -> None:
     found = ways.beside(End("on_0", ""), End(":c_1_0", "in_0"))
-    assert found == [":c_0_0", ":c_2_0", ":c_3_0", ":c_4_0", ":c_5_0", ":c_6_0"]
+    assert found == [":c_0_0", ":c_2_0", ":c_3_0", ":c_4_0", ":c_5_0", ":c_6_0", ":c_7_0"]
     assert ways.beside(End(":d_0_0", "on_0"), End(":c_1_0", "in_0")) == found
     assert ":c_0_0" not in ways.beside(End("left_0", ""), End(":c_4_0", "in_0"))
 
