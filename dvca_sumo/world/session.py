@@ -32,7 +32,7 @@ from dvca_sumo.world.lingering import Lingering
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 from dvca_sumo.world.setback import Setback
 from dvca_sumo.world.signals import Signals
-from dvca_sumo.world.straddling import SLOW, outline, taken
+from dvca_sumo.world.straddling import SLOW, outline, strip, taken
 from dvca_sumo.world.ways import End, Link, Ways, edge_of, is_inner
 
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
@@ -132,6 +132,7 @@ class Session:
         self._adopted: dict[str, _Adopted] = {}  # by ego
         self._shadowed: set[str] = set()  # edges for which there is a route of a shadow
         self._ways = Ways(_links_of, libsumo.lane.getInternalFoes, libsumo.lane.getIDList)
+        self._overlaid: dict[str, list[str]] = {}  # lanes of junctions that lie on one of a road
         self._has_sublanes = float(libsumo.simulation.getOption("lateral-resolution")) > 0.0
         self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
@@ -379,6 +380,7 @@ class Session:
         for lane in dict.fromkeys(end.lane for end in ends if not end.origin):
             near = _adjacent_lanes(lane)
             beside += [*near, lane] if found in near else near
+            beside += self._lying_on(lane)
         if ends:
             beside += self._ways.beside(*ends)
         if not beside:
@@ -391,6 +393,15 @@ class Session:
             if part is not None and not self._is_occupied(lane, *part, ego):
                 parts[lane] = part
         return parts
+
+    def _lying_on(self, lane: str) -> list[str]:
+        """Lanes of the junction where the road of a lane begins that lead elsewhere, over the lane."""
+        if lane not in self._overlaid:
+            road, way = edge_of(lane), strip(*self._middle(lane))
+            across = self._ways.inner_lanes(f":{libsumo.edge.getFromJunction(road)}")
+            elsewhere = (one for one in across if self._ways.road_after(one) != road)
+            self._overlaid[lane] = [one for one in elsewhere if strip(*self._middle(one)).intersects(way)]
+        return self._overlaid[lane]
 
     def _is_occupied(self, lane: str, begin: float, end: float, ego: str) -> bool:
         """Whether somebody is on that part of a lane already: who is stopped beside an ego must not stay for ever."""

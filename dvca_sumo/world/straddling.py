@@ -22,6 +22,11 @@ def outline(truth: EgoTruth, shape: VehicleShape) -> shapely.Polygon:
     return shapely.Polygon(corners(box_of(truth.x, truth.y, truth.heading, shape)[None])[0])
 
 
+def strip(middle: shapely.LineString, width: float) -> shapely.Polygon:
+    """A lane of `width` [m] along its centre line."""
+    return middle.buffer(0.5 * width, cap_style="flat", join_style="mitre")
+
+
 def taken(
     body: shapely.Polygon, middle: shapely.LineString, width: float, *, is_inner: bool = False
 ) -> tuple[float, float] | None:
@@ -30,10 +35,10 @@ def taken(
     `is_inner`: whether the lane is one of a junction.
     A body that is on what comes before the lane, too, begins at less than 0: as far back as it reaches.
     """
-    reach = max(0.5 * width - (0.0 if is_inner else _REACH), 0.0)
-    if body.distance(middle) >= reach:
+    width = max(width - 2.0 * (0.0 if is_inner else _REACH), 0.0)
+    if body.distance(middle) >= 0.5 * width:
         return None
-    way = middle.buffer(reach, cap_style="flat", join_style="mitre")
+    way = strip(middle, width)
     stations = shapely.line_locate_point(middle, shapely.points(shapely.get_coordinates(way.intersection(body))))
     begin, end = float(stations.min(initial=math.inf)), float(stations.max(initial=0.0))
     if end - begin <= _SHORTEST:

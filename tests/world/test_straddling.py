@@ -64,6 +64,15 @@ CROSS_EDGES = "".join(
 CROSSING = """
 <trip id="ego" from="ab" to="bc" depart="0" departPos="150" departLane="0" departSpeed="0"/>
 <trip id="other" from="ab" to="bc" depart="4" departPos="100" departLane="1" departSpeed="8"/>"""
+# Who crosses the road is drawn to do so where it has left the junction.
+BULGE = '<connection from="nb" to="bs" fromLane="0" toLane="0" shape="-1.6,12 16,0 -1.6,-12"/>'
+BULGE_EDGES = "".join(
+    f'<edge id="{name}" from="{name[0]}" to="{name[1]}" speed="13.9" priority="9"/>'
+    for name in ("ab", "bc", "nb", "bs")
+)
+BULGING = """
+<trip id="ego" from="ab" to="bc" depart="0" departPos="150" departSpeed="0"/>
+<trip id="other" from="nb" to="bs" depart="6" departPos="100" departSpeed="8"/>"""
 OUT, BACK = 15, 250  # steps after which it stands across the lanes, and goes back to its own
 ASIDE = 2.1  # [m] its front is over the edge then
 
@@ -151,6 +160,16 @@ def test_who_comes_by_another_way_stops_for_a_tail_that_is_still_on_the_junction
 ) -> None:
     net = plain_file(MERGE_NODES, MERGE_EDGES, MERGE_WAYS)
     gaps = _gaps_to_one_that_stops(tmp_path, net, MERGING, lambda lane: lane == "be_0", past)
+    assert min(gaps) > 0.3
+    assert (gaps[-1] < 5.0) is stops
+
+
+@pytest.mark.parametrize(("past", "stops"), [(10.0, True), (25.0, False)])  # [m] the front is beyond the junction
+def test_who_crosses_a_road_that_has_left_the_junction_stops_for_an_ego_there(
+    tmp_path: Path, plain_file: Callable[..., Path], past: float, *, stops: bool
+) -> None:
+    net = plain_file(CROSS_NODES, BULGE_EDGES, BULGE)
+    gaps = _gaps_to_one_that_stops(tmp_path, net, BULGING, lambda lane: lane == "bc_0", past)
     assert min(gaps) > 0.3
     assert (gaps[-1] < 5.0) is stops
 
