@@ -32,7 +32,7 @@ from dvca_sumo.world.lingering import Lingering
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 from dvca_sumo.world.setback import Setback
 from dvca_sumo.world.signals import Signals
-from dvca_sumo.world.straddling import SLOW, outline, strip, taken
+from dvca_sumo.world.straddling import ROOM, SLOW, outline, strip, taken
 from dvca_sumo.world.ways import End, Link, Ways, edge_of, is_inner
 
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
@@ -376,20 +376,23 @@ class Session:
         self, ego: str, truth: EgoTruth, shape: VehicleShape, ends: Sequence[End]
     ) -> dict[str, tuple[float, float]]:
         """Lanes that an ego is on, beside where SUMO has found it, and from where to where [m]."""
-        found, beside = libsumo.vehicle.getLaneID(ego), list[str]()
+        if not ends:
+            return {}
+        front, rear = ends
+        found, beside = libsumo.vehicle.getLaneID(ego), [*self._ways.beside(front)]
         for lane in dict.fromkeys(end.lane for end in ends if not end.origin):
             near = _adjacent_lanes(lane)
             beside += [*near, lane] if found in near else near
             beside += self._lying_on(lane)
-        if ends:
-            beside += self._ways.beside(*ends)
-        if not beside:
+        # Who comes by the ego's tail cuts bends; who comes by its front it may be waiting for.
+        rooms = dict.fromkeys(beside, ROOM) | dict.fromkeys(self._ways.behind(front, rear), 0.0)
+        if not rooms:
             return {}
         body, parts = outline(truth, shape), {}
-        for lane in beside:
+        for lane, room in rooms.items():
             if lane == found:
                 continue
-            part = taken(body, *self._middle(lane), is_inner=is_inner(lane))
+            part = taken(body, *self._middle(lane), room)
             if part is not None and not self._is_occupied(lane, *part, ego):
                 parts[lane] = part
         return parts

@@ -13,7 +13,7 @@ from dvca_sumo.messages import VehicleShape
 from dvca_sumo.truth import EgoTruth
 
 SLOW = 5.0  # [m/s] above, an ego is on its way from one lane to the other, and soon on one
-_REACH = 0.4  # [m] into a lane of a road: up to that, a car in its middle has room to pass; on junctions it cuts bends
+ROOM = 0.4  # [m] into a lane: up to that, a car in its middle has room to pass
 _SHORTEST = 0.1  # [m] of a lane, less is nobody's way
 
 
@@ -28,14 +28,14 @@ def strip(middle: shapely.LineString, width: float) -> shapely.Polygon:
 
 
 def taken(
-    body: shapely.Polygon, middle: shapely.LineString, width: float, *, is_inner: bool = False
+    body: shapely.Polygon, middle: shapely.LineString, width: float, room: float = ROOM
 ) -> tuple[float, float] | None:
     """From where to where a body is in the way on a lane of `width` [m], along its centre line [m]; None: it is not.
 
-    `is_inner`: whether the lane is one of a junction.
+    `room`: how far into the lane it may be, and not in the way [m].
     A body that is on what comes before the lane, too, begins at less than 0: as far back as it reaches.
     """
-    width = max(width - 2.0 * (0.0 if is_inner else _REACH), 0.0)
+    width = max(width - 2.0 * room, 0.0)
     if body.distance(middle) >= 0.5 * width:
         return None
     way = strip(middle, width)

@@ -36,22 +36,31 @@ class Ways:
         self._lanes = lanes
         self._ways: dict[str, list[list[str]]] = {}  # by lane of a road
         self._inner: dict[str, list[str]] = {}  # lanes by junction
-        self._blind: dict[End, list[str]] = {}
+        self._blind: dict[End, list[str]] = {}  # those `beside` a front
 
-    def beside(self, front: End, rear: End) -> list[str]:
-        """Lanes of junctions on which SUMO's drivers may not see a body with these ends.
+    def beside(self, front: End) -> list[str]:
+        """Lanes of the junction that a body's front is on, from which SUMO's drivers do not look for it.
 
         They see who is on a way that touches theirs as the net has it, or is another one from their lane, up to its
-        second lane; and they take one that has left a junction with its front to be gone, though its tail may still be
-        in their way.
+        second lane.
         """
-        lanes = list[str]()
-        if front.origin:
-            lanes += self._blind_to(front)
-        if rear.origin and _junction_of(rear.lane) != _junction_of(front.lane):
-            edges = {edge_of(lane) for lane in self._way_of(rear)}
-            lanes += [lane for lane in self.inner_lanes(_junction_of(rear.lane)) if edge_of(lane) not in edges]
-        return lanes
+        if not front.origin:
+            return []
+        if front not in self._blind:
+            seeing = {*self._way_of(front), *(way[0] for way in self._ways_from(front.origin))}
+            others = (lane for lane in self.inner_lanes(_junction_of(front.lane)) if lane not in seeing)
+            self._blind[front] = [lane for lane in others if front.lane not in self._foes(lane)]
+        return self._blind[front]
+
+    def behind(self, front: End, rear: End) -> list[str]:
+        """Lanes of the junction that a body's rear is on, from which SUMO's drivers take it to be gone.
+
+        They do so when its front has left the junction, though its tail may still be in their way.
+        """
+        if not rear.origin or _junction_of(rear.lane) == _junction_of(front.lane):
+            return []
+        edges = {edge_of(lane) for lane in self._way_of(rear)}
+        return [lane for lane in self.inner_lanes(_junction_of(rear.lane)) if edge_of(lane) not in edges]
 
     def inner_lanes(self, junction: str) -> list[str]:
         """The lanes of vehicles on a junction, by the beginning of their names."""
@@ -64,14 +73,6 @@ class Ways:
     def road_after(self, lane: str) -> str:
         """The edge of a road that a lane of a junction leads to."""
         return edge_of(next(iter(self._links(lane))).to)
-
-    def _blind_to(self, front: End) -> list[str]:
-        """The lanes of a junction from which drivers do not look at that lane of it."""
-        if front not in self._blind:
-            seeing = {*self._way_of(front), *(way[0] for way in self._ways_from(front.origin))}
-            others = (lane for lane in self.inner_lanes(_junction_of(front.lane)) if lane not in seeing)
-            self._blind[front] = [lane for lane in others if front.lane not in self._foes(lane)]
-        return self._blind[front]
 
     def _way_of(self, end: End) -> list[str]:
         """All lanes of a junction on the way that an end is on."""

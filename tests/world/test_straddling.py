@@ -144,7 +144,7 @@ def test_who_leaves_its_lane_by_a_way_beside_the_egos_stops_behind_it_on_the_jun
     assert 0.5 < min(_gaps_to_one_that_stops(tmp_path, net, FORKING, lambda lane: lane.startswith(":"), past)) < 5.0
 
 
-@pytest.mark.parametrize(("aside", "stops"), [(1.5, True), (0.5, False)])  # [m] to the left of its lane's middle
+@pytest.mark.parametrize(("aside", "stops"), [(1.5, True), (1.0, False)])  # [m] to the left of its lane's middle
 def test_who_comes_from_the_lane_beside_stops_on_the_junction_behind_an_ego_that_is_in_its_way(
     tmp_path: Path, plain_file: Callable[..., Path], aside: float, *, stops: bool
 ) -> None:

@@ -34,23 +34,24 @@ def ways() -> Ways:
 
 def test_who_leaves_the_same_lane_sees_one_up_to_its_second_lane(ways: Ways) -> None:
     for lane in (":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0"):
-        assert not {":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0"} & {*ways.beside(End(lane, "in_0"), ON_ROAD)}
-    assert ways.beside(ON_ROAD, ON_ROAD) == []
+        assert not {":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0"} & {*ways.beside(End(lane, "in_0"))}
+    assert ways.beside(ON_ROAD) == []
 
 
 def test_who_is_on_another_way_sees_one_on_a_lane_that_touches_it_in_the_net(ways: Ways) -> None:
-    for rear in (ON_ROAD, End(":c_0_0", "in_0"), End(":c_4_0", "in_0")):
-        assert ways.beside(End(":c_4_0", "in_0"), rear) == [":c_5_0", ":c_6_0"]
-    assert ways.beside(End(":c_0_0", "in_0"), ON_ROAD) == [":c_1_1", ":c_5_0", ":c_6_0", ":c_7_0"]
+    assert ways.beside(End(":c_4_0", "in_0")) == [":c_5_0", ":c_6_0"]
+    assert ways.beside(End(":c_0_0", "in_0")) == [":c_1_1", ":c_5_0", ":c_6_0", ":c_7_0"]
     of_all = {":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0", ":c_5_0", ":c_6_0", ":c_7_0"}
-    assert {*ways.beside(End(":c_1_1", "in_1"), ON_ROAD)} == of_all
+    assert {*ways.beside(End(":c_1_1", "in_1"))} == of_all
 
 
 def test_a_tail_may_be_on_all_lanes_of_vehicles_on_the_junction_but_its_own_and_those_next_to_it(ways: Ways) -> None:
-    found = ways.beside(End("on_0", ""), End(":c_1_0", "in_0"))
+    found = ways.behind(End("on_0", ""), End(":c_1_0", "in_0"))
     assert found == [":c_0_0", ":c_2_0", ":c_3_0", ":c_4_0", ":c_5_0", ":c_6_0", ":c_7_0"]
-    assert ways.beside(End(":d_0_0", "on_0"), End(":c_1_0", "in_0")) == found
-    assert ":c_0_0" not in ways.beside(End("left_0", ""), End(":c_4_0", "in_0"))
+    assert ways.behind(End(":d_0_0", "on_0"), End(":c_1_0", "in_0")) == found
+    assert ":c_0_0" not in ways.behind(End("left_0", ""), End(":c_4_0", "in_0"))
+    for rear in (ON_ROAD, End(":c_0_0", "in_0"), End(":c_4_0", "in_0")):
+        assert ways.behind(End(":c_4_0", "in_0"), rear) == []
 
 
 def test_names_tell_edges_and_junctions(ways: Ways) -> None:
