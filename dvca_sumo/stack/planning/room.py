@@ -17,6 +17,8 @@ class Room(NamedTuple):
 
     lane_left: float  # at most, the body staying in its lane
     lane_right: float  # at least; more than `lane_left` where the lane is too narrow for the body
+    road_left: float  # at most, the body staying on the road, on the way there and back too
+    road_right: float  # at least
     wanted: list[float]  # one on either side at most: the wanted clearance, or what road and wheels allow
 
     def is_in_lane(self, offset: float, tolerance: float = 0.0) -> bool:
@@ -37,28 +39,24 @@ def room_beside(
     if blocker.walks:  # may be met where the lane is wider than on the way there
         begin = max(begin - blend, 0.0)
     beside = window.span(begin, end)
+    edge = config.edge_clearance
+    inward_left, inward_right = _steerable(window.curvatures[whole], shape, config)
+    leftmost = max(min(float((window.road_left - window.swept_left)[whole].min()) - edge, inward_left), 0.0)
+    rightmost = min(max(float((window.road_right - window.swept_right)[whole].max()) + edge, inward_right), 0.0)
+    left = min(max(blocker.left + blocker.wanted, 0.0), leftmost)
+    right = max(min(blocker.right - blocker.wanted, 0.0), rightmost)
+    wanted = []
+    if left - blocker.left >= least:
+        wanted.append(left)
+    if blocker.right - right >= least:
+        wanted.append(right)
     return Room(
         float((window.lane_left - window.swept_left)[beside].min()) + OVER_LINE,
         float((window.lane_right - window.swept_right)[beside].max()) - OVER_LINE,
-        _wanted(blocker, window, whole, least, shape, config),
+        leftmost,
+        rightmost,
+        wanted,
     )
-
-
-def _wanted(
-    blocker: Blocker, window: Window, span: slice, least: float, shape: VehicleShape, config: PlanningConfig
-) -> list[float]:
-    edge = config.edge_clearance
-    inward_left, inward_right = _steerable(window.curvatures[span], shape, config)
-    leftmost = max(min(float((window.road_left - window.swept_left)[span].min()) - edge, inward_left), 0.0)
-    rightmost = min(max(float((window.road_right - window.swept_right)[span].max()) + edge, inward_right), 0.0)
-    left = min(max(blocker.left + blocker.wanted, 0.0), leftmost)
-    right = max(min(blocker.right - blocker.wanted, 0.0), rightmost)
-    offsets = []
-    if left - blocker.left >= least:
-        offsets.append(left)
-    if blocker.right - right >= least:
-        offsets.append(right)
-    return offsets
 
 
 def _steerable(curvatures: Floats, shape: VehicleShape, config: PlanningConfig) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from planned_drives import (
     sweeps,
 )
 
-from dvca_sumo.geometry.boxes import box_of, distances
+from dvca_sumo.geometry.boxes import box_of, distances, outlines
 from dvca_sumo.messages import Floats, ObjectClass
 from dvca_sumo.roadmap.route import Control
 from dvca_sumo.stack.planning import PlanningConfig
@@ -31,6 +31,7 @@ from dvca_sumo.stack.planning.nudging import NudgeDecider
 from dvca_sumo.stack.planning.reference import Reference
 from dvca_sumo.stack.planning.scene import scene_in
 from dvca_sumo.stack.planning.situation import Situation
+from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.world import VehicleLimits
 
 
@@ -255,6 +256,20 @@ def test_road_is_not_left_on_the_way_to_where_it_is_wider() -> None:
     assert driven.states[before, 2].max() + 0.5 * SHAPE.width < 1.7
     later = drive(route, 30.0, speed=8.0, actors=[person(3, 132.0, -0.7)])
     assert later.fronts[-1] > 140.0
+
+
+@pytest.mark.parametrize("narrows", [20.0, 28.0])  # [m] behind the beginning of the queue, within which
+def test_road_that_narrows_beside_a_queue_is_not_left_for_who_needs_less_room_than_the_first(narrows: float) -> None:
+    wide = road()
+    edge = np.interp(wide.line.stations, [100.0, 100.0 + narrows], [-4.8, -1.6])
+    route = msgspec.structs.replace(wide, lane_right=edge, road_right=edge)
+    queue = [car(1, 103.0, 1.0), car(2, 110.5, 1.8), car(3, 118.0, 2.5), car(4, 125.5, 3.1)]
+    driven = drive(route, 30.0, speed=8.0, station=50.0, actors=queue)
+    assert driven.fronts[-1] > 150.0
+    assert driven.clearances.min() > 0.4
+    bodies = np.array([box_of(x, y, heading, SHAPE) for x, y, heading in driven.states[:, 1:4].tolist()])
+    x, y = outlines(bodies, 6).reshape(-1, 2).T
+    assert (np.interp(x, route.line.stations, edge) - y).max() < Thresholds().lane_tolerance
 
 
 @pytest.mark.parametrize("x", [20.5, 22.0, 23.5])
