@@ -64,10 +64,9 @@ class NudgeDecider:
         for blocker in found:
             plateau = self._plateau(blocker, situation)
             before = last or self._present(blocker.track, situation)
-            aside = before and self._going_on(blocker, plateau, before, situation)
-            if before and aside:
-                begin, end, offset = self._passed_at(blocker, aside)
-                plateau = Plateau(max(begin, before.begin), max(end, before.begin), offset)
+            same = before and self._going_on(blocker, plateau, before, situation)
+            if same:
+                plateau = same
                 followers.add(blocker.track)
             if plateau is not None:
                 passed.append((blocker, plateau))
@@ -149,28 +148,31 @@ class NudgeDecider:
         ]
         return Plateau(0.0, 0.0, min(held, key=lambda one: abs(one - offset))) if held else None
 
-    def _going_on(self, blocker: Blocker, plateau: Plateau | None, last: Plateau, situation: Situation) -> float:
-        """How far aside the ego passes an object because it passed another one so before, though it need not.
+    def _going_on(
+        self, blocker: Blocker, plateau: Plateau | None, last: Plateau, situation: Situation
+    ) -> Plateau | None:
+        """Where the ego passes an object as far aside as what it passed before, though it need not; None: it does not.
 
-        On less way than it takes to go back and out again, its front would turn towards it. No farther than the road
-        reaches; 0 where it need not, or cannot.
+        On less way than it takes to go back and out again, its front would turn towards it. Where the road does not
+        reach that far, it is as far as it does.
         """
         offset, wanted = last.offset, 0.0 if plateau is None else plateau.offset
         if blocker.walks or wanted * offset < 0.0 or self._meets_another(blocker, offset):
-            return 0.0
+            return None
         window, speed = situation.window, situation.speed
         back = way_back(Lateral(offset, 0.0, 0.0), last.end, speed, window, self._shape, self._config)
         out = blend_length(wanted, speed, self._config)
         if self._passed_at(blocker, offset).begin > last.end + back.length + out:
-            return 0.0
+            return None
         least = self._config.nudge_clearance_least
         room = room_beside(blocker, window, speed, least, self._shape, self._config)
         offset = min(max(offset, room.road_right), room.road_left)
         if abs(wanted) >= abs(offset) or blocker.clearance(offset) < blocker.clearance(wanted):
-            return 0.0
-        if room.is_in_lane(offset) or self._may_leave_lane(blocker, offset, 0.0, situation):
-            return offset
-        return 0.0
+            return None
+        if not room.is_in_lane(offset) and not self._may_leave_lane(blocker, offset, 0.0, situation):
+            return None
+        begin, end, _ = self._passed_at(blocker, offset)
+        return Plateau(max(begin, last.begin), max(end, last.begin), offset)
 
     def _reconciled(self, passed: Sequence[tuple[Blocker, Plateau]], standing: Beside) -> list[tuple[Blocker, Plateau]]:
         """Where others, soon before or after one, could not be passed as far aside as it, it is as little as need be.
