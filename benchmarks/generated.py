@@ -20,13 +20,18 @@ TYPE, LANES = "--default.junctions.type", "--default.lanenumber=2"
 SIGNALS, WALKS = "--default-junction-type=traffic_light", ["--sidewalks.guess.from-permissions", "--crossings.guess"]
 SPIDER = ["--spider", "--spider.arm-number=7", "--spider.circle-number=5", "--spider.space-radius=120"]
 SMALL_SPIDER = ["--spider", "--spider.arm-number=5", "--spider.circle-number=3", "--spider.space-radius=130"]
+RANDOM = ["--rand", "--rand.iterations=120"]
 BLOCKS = ["--grid", "--grid.number=4", "--grid.length=200"]
 NETS = {
     "all_way_stop": (1.5, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=allway_stop"]),
     "left_hand": (1.2, ["--grid", "--grid.number=5", "--grid.length=180", "--lefthand", LANES, "--turn-lanes=1"]),
     "right_before_left": (1.2, [*SPIDER, f"{TYPE}=right_before_left"]),
-    "signals": (0.8, ["--rand", "--rand.iterations=120", LANES, SIGNALS]),
+    "right_before_left_grid": (1.2, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=right_before_left"]),
+    "right_before_left_random": (1.2, [*RANDOM, f"{TYPE}=right_before_left"]),
+    "priority_random": (0.8, [*RANDOM, LANES, f"{TYPE}=priority", "--rand.random-priority=true"]),
+    "signals": (0.8, [*RANDOM, LANES, SIGNALS]),
     "spider_signals": (1.0, [*SMALL_SPIDER, "--spider.omit-center", LANES, SIGNALS]),
+    "three_lanes": (1.0, [*BLOCKS, "--default.lanenumber=3", "--turn-lanes=1", f"{TYPE}=traffic_light"]),
     "turn_lanes": (0.8, [*BLOCKS, "--turn-lanes=1", "--turn-lanes.length=40", LANES, SIGNALS]),
     "right_on_red": (0.7, [*BLOCKS, LANES, f"{SIGNALS}_right_on_red"]),
     "stop_signs": (1.0, ["--grid", "--grid.number=5", "--grid.length=120", LANES, f"{TYPE}=priority_stop"]),
