@@ -35,7 +35,8 @@ class Ways:
         self._foes = foes
         self._lanes = lanes
         self._ways: dict[str, list[list[str]]] = {}  # by lane of a road
-        self._inner: dict[str, list[str]] = {}  # lanes by junction
+        self._named: dict[str, list[str]] = {}  # lanes by junction, whether they lead on or not
+        self._inner: dict[str, list[str]] = {}  # those that do
         self._blind: dict[End, list[str]] = {}  # those `beside` a front
 
     def beside(self, front: End) -> list[str]:
@@ -63,15 +64,17 @@ class Ways:
         return [lane for lane in self.inner_lanes(_junction_of(rear.lane)) if edge_of(lane) not in edges]
 
     def inner_lanes(self, junction: str) -> list[str]:
-        """The lanes of vehicles on a junction, by the beginning of their names."""
-        if not self._inner:
-            for lane in self._lanes():
-                if is_inner(lane) and edge_of(lane).rpartition("_")[2].isdecimal():
-                    self._inner.setdefault(_junction_of(lane), []).append(lane)
-        return self._inner.get(junction, [])
+        """The lanes of vehicles on a junction that lead on, by the beginning of their names."""
+        if junction not in self._inner:
+            if not self._named:
+                for lane in self._lanes():
+                    if is_inner(lane) and edge_of(lane).rpartition("_")[2].isdecimal():
+                        self._named.setdefault(_junction_of(lane), []).append(lane)
+            self._inner[junction] = [lane for lane in self._named.get(junction, []) if [*self._links(lane)]]
+        return self._inner[junction]
 
     def road_after(self, lane: str) -> str:
-        """The edge of a road that a lane of a junction leads to."""
+        """The edge of a road that one of the `inner_lanes` leads to."""
         return edge_of(next(iter(self._links(lane))).to)
 
     def _way_of(self, end: End) -> list[str]:

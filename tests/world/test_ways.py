@@ -20,6 +20,7 @@ LINKS = {
     ":c_4_0": [Link("left_0", "")],
     ":c_5_0": [Link("right_0", "")],
     ":c_6_0": [Link("back_0", "")],
+    ":c_7_0": [Link("back_0", "")],
 }
 # Whom who turns left minds, and who minds it, as far as the net has it.
 FOES = {":c_4_0": (":c_1_1", ":c_7_0"), ":c_1_1": (":c_4_0",), ":c_7_0": (":c_4_0",)}
@@ -28,7 +29,7 @@ ON_ROAD = End("in_0", "")
 
 @pytest.fixture
 def ways() -> Ways:
-    lanes = [*LINKS, ":c_7_0", ":c_c0_0", ":c_w0_0", ":d_0_0", "left_0"]
+    lanes = [*LINKS, ":c_8_0", ":c_c0_0", ":c_w0_0", ":d_0_0", "left_0"]
     return Ways(lambda lane: LINKS.get(lane, []), lambda lane: FOES.get(lane, ()), lambda: lanes)
 
 
@@ -60,3 +61,7 @@ def test_names_tell_edges_and_junctions(ways: Ways) -> None:
     assert not is_inner("c_0")
     assert ways.road_after(":c_0_0") == "left"
     assert ways.inner_lanes("nowhere") == []
+
+
+def test_lanes_of_people_and_those_that_lead_nowhere_are_nobodys_way(ways: Ways) -> None:
+    assert {*ways.inner_lanes(":c")} == {lane for lane in LINKS if lane.startswith(":c_")}

@@ -64,9 +64,9 @@ class NudgeDecider:
         for blocker in found:
             plateau = self._plateau(blocker, situation)
             before = last or self._present(blocker.track, situation)
-            same = before and self._going_on(blocker, plateau, before, situation)
-            if same:
-                plateau = same
+            going_on = before and self._going_on(blocker, plateau, before, situation)
+            if going_on:
+                plateau = going_on
                 followers.add(blocker.track)
             if plateau is not None:
                 passed.append((blocker, plateau))
