@@ -37,6 +37,7 @@ from dvca_sumo.world.ways import End, Link, Ways, edge_of, is_inner
 
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
 NEVER_TELEPORTED = "dvca.ego"  # vehicle type of an adopted ego
+_TURNS_BACK = ("t", "T")  # SUMO's letters; the second one is for left-hand traffic
 SHADOW = "dvca.shadow"  # vehicle type of what stands for an ego on a second lane
 
 # What is asked of who is near tells of which kind they are: the answers for both arrive in one dictionary, by id.
@@ -131,7 +132,7 @@ class Session:
         self._footing = Footing(self._walking_area)
         self._adopted: dict[str, _Adopted] = {}  # by ego
         self._shadowed: set[str] = set()  # edges for which there is a route of a shadow
-        self._ways = Ways(_links_of, libsumo.lane.getInternalFoes, libsumo.lane.getIDList)
+        self._ways = Ways(_links_of, libsumo.lane.getInternalFoes, _adjacent_lanes, libsumo.lane.getIDList)
         self._overlaid: dict[str, list[str]] = {}  # lanes of junctions that lie on one of a road
         self._has_sublanes = float(libsumo.simulation.getOption("lateral-resolution")) > 0.0
         self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
@@ -398,10 +399,10 @@ class Session:
         return parts
 
     def _lying_on(self, lane: str) -> list[str]:
-        """Lanes of the junction where the road of a lane begins that lead elsewhere, over the lane."""
+        """Lanes of the junction where the road of a lane begins that lead onward elsewhere, over the lane."""
         if lane not in self._overlaid:
             road, way = edge_of(lane), strip(*self._middle(lane))
-            across = self._ways.inner_lanes(f":{libsumo.edge.getFromJunction(road)}")
+            across = self._ways.onward_lanes(f":{libsumo.edge.getFromJunction(road)}")
             elsewhere = (one for one in across if self._ways.road_after(one) != road)
             self._overlaid[lane] = [one for one in elsewhere if strip(*self._middle(one)).intersects(way)]
         return self._overlaid[lane]
@@ -542,7 +543,7 @@ class Session:
 
 
 def _links_of(lane: str) -> list[Link]:
-    return [Link(to, via) for to, _, _, _, via, _, _, _ in libsumo.lane.getLinks(lane)]
+    return [Link(to, via, way in _TURNS_BACK) for to, _, _, _, via, _, way, _ in libsumo.lane.getLinks(lane)]
 
 
 def _is_for_cars(lane: str) -> bool:

@@ -12,6 +12,7 @@ class Link(NamedTuple):
 
     to: str
     via: str  # the next lane of the junction on the way there, "" where there is none
+    turns_back: bool = False
 
 
 class End(NamedTuple):
@@ -28,11 +29,16 @@ class Ways:
         self,
         links: Callable[[str], Iterable[Link]],
         foes: Callable[[str], Collection[str]],
+        adjacent: Callable[[str], Iterable[str]],
         lanes: Callable[[], Iterable[str]],
     ) -> None:
-        """`links` tells those of a lane, `foes` whom one on a lane of a junction minds, `lanes` the names of all."""
+        """What is known of a lane, and the names of all `lanes`.
+
+        `links` are those of the lane, `foes` whom one on it minds on a junction, `adjacent` its neighbours on the road.
+        """
         self._links = links
         self._foes = foes
+        self._adjacent = adjacent
         self._lanes = lanes
         self._ways: dict[str, list[list[str]]] = {}  # by lane of a road
         self._named: dict[str, list[str]] = {}  # lanes by junction, whether they lead on or not
@@ -40,7 +46,7 @@ class Ways:
         self._blind: dict[End, list[str]] = {}  # those `beside` a front
 
     def beside(self, front: End) -> list[str]:
-        """Lanes of the junction that a body's front is on, from which SUMO's drivers do not look for it.
+        """Lanes of ways from the same lane as a body's front and those next to it, whose drivers do not look for it.
 
         They see who is on a way that touches theirs as the net has it, or is another one from their lane, up to its
         second lane.
@@ -48,9 +54,9 @@ class Ways:
         if not front.origin:
             return []
         if front not in self._blind:
-            seeing = {*self._way_of(front), *(way[0] for way in self._ways_from(front.origin))}
-            others = (lane for lane in self.inner_lanes(_junction_of(front.lane)) if lane not in seeing)
-            self._blind[front] = [lane for lane in others if front.lane not in self._foes(lane)]
+            ways = [way[1:] for way in self._ways_from(front.origin) if front.lane not in way]
+            ways += [way for lane in self._adjacent(front.origin) for way in self._ways_from(lane)]
+            self._blind[front] = [lane for way in ways for lane in way if front.lane not in self._foes(lane)]
         return self._blind[front]
 
     def behind(self, front: End, rear: End) -> list[str]:
@@ -73,6 +79,13 @@ class Ways:
             self._inner[junction] = [lane for lane in self._named.get(junction, []) if [*self._links(lane)]]
         return self._inner[junction]
 
+    def onward_lanes(self, junction: str) -> list[str]:
+        """The `inner_lanes` of ways that do not turn back.
+
+        Hardly anybody drives those that do, and they lie across many others, on which all wait for who stands there.
+        """
+        return [lane for lane in self.inner_lanes(junction) if not any(link.turns_back for link in self._links(lane))]
+
     def road_after(self, lane: str) -> str:
         """The edge of a road that one of the `inner_lanes` leads to."""
         return edge_of(next(iter(self._links(lane))).to)
@@ -82,9 +95,10 @@ class Ways:
         return next((way for way in self._ways_from(end.origin) if end.lane in way), [end.lane])
 
     def _ways_from(self, lane: str) -> list[list[str]]:
-        """The lanes of a junction, way by way, by which one leaves a lane of a road."""
+        """The lanes of a junction, way by way, by which one leaves a lane of a road, without turns back."""
         if lane not in self._ways:
-            self._ways[lane] = [self._way_by(link.via) for link in self._links(lane) if link.via]
+            onward = (link.via for link in self._links(lane) if link.via and not link.turns_back)
+            self._ways[lane] = [self._way_by(via) for via in onward]
         return self._ways[lane]
 
     def _way_by(self, lane: str) -> list[str]:

@@ -9,17 +9,17 @@ LINKS = {
         Link("left_0", ":c_0_0"),
         Link("on_0", ":c_1_0"),
         Link("right_0", ":c_2_0"),
-        Link("back_0", ":c_3_0"),
+        Link("back_0", ":c_3_0", turns_back=True),
     ],
     "in_1": [Link("on_1", ":c_1_1")],
     ":c_0_0": [Link("left_0", ":c_4_0")],
     ":c_2_0": [Link("right_0", ":c_5_0")],
-    ":c_3_0": [Link("back_0", ":c_6_0")],
+    ":c_3_0": [Link("back_0", ":c_6_0", turns_back=True)],
     ":c_1_0": [Link("on_0", "")],
     ":c_1_1": [Link("on_1", "")],
     ":c_4_0": [Link("left_0", "")],
     ":c_5_0": [Link("right_0", "")],
-    ":c_6_0": [Link("back_0", "")],
+    ":c_6_0": [Link("back_0", "", turns_back=True)],
     ":c_7_0": [Link("back_0", "")],
 }
 # Whom who turns left minds, and who minds it, as far as the net has it.
@@ -30,20 +30,26 @@ ON_ROAD = End("in_0", "")
 @pytest.fixture
 def ways() -> Ways:
     lanes = [*LINKS, ":c_8_0", ":c_c0_0", ":c_w0_0", ":d_0_0", "left_0"]
-    return Ways(lambda lane: LINKS.get(lane, []), lambda lane: FOES.get(lane, ()), lambda: lanes)
+    adjacent = {"in_0": ["in_1"], "in_1": ["in_0"]}
+    return Ways(lambda lane: LINKS.get(lane, []), lambda lane: FOES.get(lane, ()), adjacent.__getitem__, lambda: lanes)
 
 
 def test_who_leaves_the_same_lane_sees_one_up_to_its_second_lane(ways: Ways) -> None:
-    for lane in (":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0"):
-        assert not {":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0"} & {*ways.beside(End(lane, "in_0"))}
+    for lane in (":c_0_0", ":c_1_0", ":c_2_0", ":c_4_0", ":c_5_0"):
+        assert not {":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0", ":c_6_0"} & {*ways.beside(End(lane, "in_0"))}
+    assert ":c_5_0" in ways.beside(End(":c_4_0", "in_0"))
+    assert ":c_4_0" in ways.beside(End(":c_5_0", "in_0"))
     assert ways.beside(ON_ROAD) == []
 
 
-def test_who_is_on_another_way_sees_one_on_a_lane_that_touches_it_in_the_net(ways: Ways) -> None:
-    assert ways.beside(End(":c_4_0", "in_0")) == [":c_5_0", ":c_6_0"]
-    assert ways.beside(End(":c_0_0", "in_0")) == [":c_1_1", ":c_5_0", ":c_6_0", ":c_7_0"]
-    of_all = {":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0", ":c_5_0", ":c_6_0", ":c_7_0"}
-    assert {*ways.beside(End(":c_1_1", "in_1"))} == of_all
+def test_who_leaves_the_next_lane_sees_one_on_a_way_that_touches_theirs_in_the_net(ways: Ways) -> None:
+    assert ":c_1_1" not in ways.beside(End(":c_4_0", "in_0"))
+    assert ":c_1_1" in ways.beside(End(":c_0_0", "in_0"))
+    assert ways.beside(End(":c_1_1", "in_1")) == [":c_0_0", ":c_1_0", ":c_2_0", ":c_5_0"]
+
+
+def test_who_comes_from_elsewhere_is_left_to_what_the_net_says(ways: Ways) -> None:
+    assert ":c_7_0" not in ways.beside(End(":c_0_0", "in_0"))
 
 
 def test_a_tail_may_be_on_all_lanes_of_vehicles_on_the_junction_but_its_own_and_those_next_to_it(ways: Ways) -> None:
