@@ -149,9 +149,7 @@ def test_who_comes_from_the_lane_beside_stops_on_the_junction_behind_an_ego_that
     tmp_path: Path, plain_file: Callable[..., Path], aside: float, *, stops: bool
 ) -> None:
     net = plain_file(CROSS_NODES, CROSS_EDGES)
-    gaps = _gaps_to_one_that_stops(tmp_path, net, CROSSING, lambda lane: lane.startswith(":"), 11.0, aside)
-    assert min(gaps) > 0.3
-    assert (gaps[-1] < 5.0) is stops
+    assert _is_stopped_for(tmp_path, net, CROSSING, lambda lane: lane.startswith(":"), 11.0, aside) is stops
 
 
 @pytest.mark.parametrize(("past", "stops"), [(1.0, True), (2.0, False)])  # [m] the front is beyond the junction
@@ -159,9 +157,7 @@ def test_who_comes_by_another_way_stops_for_a_tail_that_is_still_on_the_junction
     tmp_path: Path, plain_file: Callable[..., Path], past: float, *, stops: bool
 ) -> None:
     net = plain_file(MERGE_NODES, MERGE_EDGES, MERGE_WAYS)
-    gaps = _gaps_to_one_that_stops(tmp_path, net, MERGING, lambda lane: lane == "be_0", past)
-    assert min(gaps) > 0.3
-    assert (gaps[-1] < 5.0) is stops
+    assert _is_stopped_for(tmp_path, net, MERGING, lambda lane: lane == "be_0", past) is stops
 
 
 @pytest.mark.parametrize(("past", "stops"), [(10.0, True), (25.0, False)])  # [m] the front is beyond the junction
@@ -169,9 +165,16 @@ def test_who_crosses_a_road_that_has_left_the_junction_stops_for_an_ego_there(
     tmp_path: Path, plain_file: Callable[..., Path], past: float, *, stops: bool
 ) -> None:
     net = plain_file(CROSS_NODES, BULGE_EDGES, BULGE)
-    gaps = _gaps_to_one_that_stops(tmp_path, net, BULGING, lambda lane: lane == "bc_0", past)
+    assert _is_stopped_for(tmp_path, net, BULGING, lambda lane: lane == "bc_0", past) is stops
+
+
+def _is_stopped_for(
+    folder: Path, net: Path, traffic: str, is_there: Callable[[str], bool], past: float, aside: float = 0.0
+) -> bool:
+    """Whether somebody stops behind an ego as of `_gaps_to_one_that_stops`; either way nobody touches it."""
+    gaps = _gaps_to_one_that_stops(folder, net, traffic, is_there, past, aside)
     assert min(gaps) > 0.3
-    assert (gaps[-1] < 5.0) is stops
+    return gaps[-1] < 5.0
 
 
 def _gaps_to_one_that_stops(
