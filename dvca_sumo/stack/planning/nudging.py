@@ -162,7 +162,8 @@ class NudgeDecider:
         window, speed = situation.window, situation.speed
         back = way_back(Lateral(offset, 0.0, 0.0), last.end, speed, window, self._shape, self._config)
         out = blend_length(wanted, speed, self._config)
-        if self._passed_at(blocker, offset).begin > last.end + back.length + out:
+        begin, end, _ = self._passed_at(blocker, offset)
+        if begin > last.end + back.length + out:
             return None
         least = self._config.nudge_clearance_least
         room = room_beside(blocker, window, speed, least, self._shape, self._config)
@@ -171,7 +172,6 @@ class NudgeDecider:
             return None
         if not room.is_in_lane(offset) and not self._may_leave_lane(blocker, offset, 0.0, situation):
             return None
-        begin, end, _ = self._passed_at(blocker, offset)
         return Plateau(max(begin, last.begin), max(end, last.begin), offset)
 
     def _reconciled(self, passed: Sequence[tuple[Blocker, Plateau]], standing: Beside) -> list[tuple[Blocker, Plateau]]:
