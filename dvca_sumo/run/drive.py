@@ -1,6 +1,7 @@
 """One ego's closed loop: sense, five components, move, be judged."""
 
 import math
+from functools import cached_property
 from typing import NamedTuple, TypeVar
 
 import msgspec
@@ -157,21 +158,22 @@ class Drive:
         self._digests.append(self._digest.step(fresh, self._path[-TICKS_PER_STEP:], moment.objects))
         return True
 
+    @cached_property
     def outcome(self) -> DriveResult:
-        """How the drive came out that is over, or is cut here."""
+        """How the drive came out that is over, or is cut here and not to go on."""
         ending = self._ending or Ending.CUT
         is_judged = math.isinf(self._contact)  # after a contact nothing was judged
         judgements = tuple(oracle.conclude(ending if is_judged else Ending.CUT) for oracle in self._oracles)
         known = {id(violation) for violation in self._violations}
-        self._violations.extend(one for judged in judgements for one in judged.violations if id(one) not in known)
-        violations = sorted(self._violations, key=lambda violation: violation.time)
+        concluded = (one for judged in judgements for one in judged.violations if id(one) not in known)
+        violations = sorted([*self._violations, *concluded], key=lambda violation: violation.time)
         digest = Digest().step(self._digests, violations).hex()
         return DriveResult(tuple(violations), judgements, ending, digest)
 
     def record(self, simulated: float) -> Record:
         """What the whole drive left, `simulated` [s] of SUMO time having passed."""
         assert self._is_whole  # else most of it is forgotten
-        outcome = self.outcome()
+        outcome = self.outcome
         return Record(
             ego=self.ego.name,
             stops=self.ego.stops,

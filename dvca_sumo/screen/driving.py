@@ -118,7 +118,7 @@ class _Fleet:
 
     def _finish(self, over: Sequence[Over]) -> None:
         for drive, error in over:
-            outcome = drive.outcome()
+            outcome = drive.outcome
             watch = self._watches.pop(drive.ego.name)
             how = TripOutcome.CONTACT
             if error is not None:

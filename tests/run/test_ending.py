@@ -1,11 +1,16 @@
 """When a drive ends, and what is judged until then."""
 
+from functools import partial
 from pathlib import Path
 
 import pytest
-from small_scenarios import EGO, driven, scenario_file
+from small_scenarios import EGO, driven, in_child, scenario_file
 
-from dvca_sumo.run import StopRule
+from dvca_sumo.engine.replay import roadmap
+from dvca_sumo.record import Record
+from dvca_sumo.run import StopRule, Task, departed
+from dvca_sumo.scenario import load_scenario
+from dvca_sumo.stack.reference import reference_stack
 from dvca_sumo.violations import Answer, Contact, Ending
 
 STOPPED = (
@@ -100,3 +105,17 @@ def test_violations_are_in_the_order_of_time_and_agree_with_the_judgements(tmp_p
     judged = [one for judgement in record.judgements for one in judgement.violations]
     assert sorted(judged, key=lambda one: one.time) == record.violations
     assert len(record.violations) >= 2
+
+
+def test_what_is_concluded_at_the_end_counts_once_however_often_it_is_asked(tmp_path: Path, street: Path) -> None:
+    task = Task(load_scenario(scenario_file(tmp_path, street, end="4")))
+
+    def job() -> tuple[Record, Record]:
+        with departed(task, partial(roadmap, street), reference_stack) as simulation:
+            drive = simulation.drive
+            return simulation.proceed(), drive.record(0.0)
+
+    first, second = in_child(job)
+    assert [one.kind for one in first.violations] == ["destination_not_reached"]
+    assert second.violations == first.violations
+    assert second.judgements == first.judgements
