@@ -399,12 +399,15 @@ class Session:
         return parts
 
     def _lying_on(self, lane: str) -> list[str]:
-        """Lanes of the junction where the road of a lane begins that lead onward elsewhere, over the lane."""
+        """Lanes of the junctions at the ends of a lane's road that lead onward over the lane, from and to elsewhere."""
         if lane not in self._overlaid:
-            road, way = edge_of(lane), strip(*self._middle(lane))
-            across = self._ways.onward_lanes(f":{libsumo.edge.getFromJunction(road)}")
-            elsewhere = (one for one in across if self._ways.road_after(one) != road)
-            self._overlaid[lane] = [one for one in elsewhere if strip(*self._middle(one)).intersects(way)]
+            of, road, area = libsumo.edge, edge_of(lane), strip(*self._middle(lane))
+            lanes = (f"{road}_{number}" for number in range(of.getLaneNumber(road)))
+            own = {one for each in lanes for way in self._ways.ways_from(each) for one in way}
+            junctions = dict.fromkeys((of.getFromJunction(road), of.getToJunction(road)))
+            across = [one for junction in junctions for one in self._ways.onward_lanes(f":{junction}")]
+            elsewhere = (one for one in across if one not in own and self._ways.road_after(one) != road)
+            self._overlaid[lane] = [one for one in elsewhere if strip(*self._middle(one)).intersects(area)]
         return self._overlaid[lane]
 
     def _is_occupied(self, lane: str, begin: float, end: float, ego: str) -> bool:

@@ -54,8 +54,8 @@ class Ways:
         if not front.origin:
             return []
         if front not in self._blind:
-            ways = [way[1:] for way in self._ways_from(front.origin) if front.lane not in way]
-            ways += [way for lane in self._adjacent(front.origin) for way in self._ways_from(lane)]
+            ways = [way[1:] for way in self.ways_from(front.origin) if front.lane not in way]
+            ways += [way for lane in self._adjacent(front.origin) for way in self.ways_from(lane)]
             self._blind[front] = [lane for way in ways for lane in way if front.lane not in self._foes(lane)]
         return self._blind[front]
 
@@ -90,16 +90,16 @@ class Ways:
         """The edge of a road that one of the `inner_lanes` leads to."""
         return edge_of(next(iter(self._links(lane))).to)
 
-    def _way_of(self, end: End) -> list[str]:
-        """All lanes of a junction on the way that an end is on."""
-        return next((way for way in self._ways_from(end.origin) if end.lane in way), [end.lane])
-
-    def _ways_from(self, lane: str) -> list[list[str]]:
+    def ways_from(self, lane: str) -> list[list[str]]:
         """The lanes of a junction, way by way, by which one leaves a lane of a road, without turns back."""
         if lane not in self._ways:
             onward = (link.via for link in self._links(lane) if link.via and not link.turns_back)
             self._ways[lane] = [self._way_by(via) for via in onward]
         return self._ways[lane]
+
+    def _way_of(self, end: End) -> list[str]:
+        """All lanes of a junction on the way that an end is on."""
+        return next((way for way in self.ways_from(end.origin) if end.lane in way), [end.lane])
 
     def _way_by(self, lane: str) -> list[str]:
         way = [lane]

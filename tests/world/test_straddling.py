@@ -64,8 +64,8 @@ CROSS_EDGES = "".join(
 CROSSING = """
 <trip id="ego" from="ab" to="bc" depart="0" departPos="150" departLane="0" departSpeed="0"/>
 <trip id="other" from="ab" to="bc" depart="4" departPos="100" departLane="1" departSpeed="8"/>"""
-# Who crosses the road is drawn to do so where it has left the junction.
-BULGE = '<connection from="nb" to="bs" fromLane="0" toLane="0" shape="-1.6,12 16,0 -1.6,-12"/>'
+# Who crosses the road is drawn to do so so far [m] beyond the middle of the junction.
+BULGE = '<connection from="nb" to="bs" fromLane="0" toLane="0" shape="-1.6,12 {},0 -1.6,-12"/>'
 BULGE_EDGES = "".join(
     f'<edge id="{name}" from="{name[0]}" to="{name[1]}" speed="13.9" priority="9"/>'
     for name in ("ab", "bc", "nb", "bs")
@@ -164,8 +164,16 @@ def test_who_comes_by_another_way_stops_for_a_tail_that_is_still_on_the_junction
 def test_who_crosses_a_road_that_has_left_the_junction_stops_for_an_ego_there(
     tmp_path: Path, plain_file: Callable[..., Path], past: float, *, stops: bool
 ) -> None:
-    net = plain_file(CROSS_NODES, BULGE_EDGES, BULGE)
+    net = plain_file(CROSS_NODES, BULGE_EDGES, BULGE.format(16))
     assert _is_stopped_for(tmp_path, net, BULGING, lambda lane: lane == "bc_0", past) is stops
+
+
+@pytest.mark.parametrize(("past", "stops"), [(50.0, False), (57.0, True)])  # [m] the front is along its route
+def test_who_crosses_a_road_before_the_junction_stops_for_an_ego_there(
+    tmp_path: Path, plain_file: Callable[..., Path], past: float, *, stops: bool
+) -> None:
+    net = plain_file(CROSS_NODES, BULGE_EDGES.replace('"9"', '"1"', 1), BULGE.format(-16))
+    assert _is_stopped_for(tmp_path, net, BULGING, lambda lane: lane == "ab_0", past) is stops
 
 
 def _is_stopped_for(
