@@ -48,15 +48,17 @@ class Ways:
     def beside(self, front: End) -> list[str]:
         """Lanes of ways from the same lane as a body's front and those next to it, whose drivers do not look for it.
 
-        They see who is on a way that touches theirs as the net has it, or is another one from their lane, up to its
-        second lane.
+        Those who come from the next lanes see who is on a way that touches theirs as the net has it. Those from the
+        same lane may do so, too, but surely only from the first lane of their way one on the first lane of another.
         """
         if not front.origin:
             return []
         if front not in self._blind:
-            ways = [way[1:] for way in self.ways_from(front.origin) if front.lane not in way]
-            ways += [way for lane in self._adjacent(front.origin) for way in self.ways_from(lane)]
-            self._blind[front] = [lane for way in ways for lane in way if front.lane not in self._foes(lane)]
+            others = [way for way in self.ways_from(front.origin) if front.lane not in way]
+            is_first = front.lane in {way[0] for way in self.ways_from(front.origin)}
+            next_to = (way for lane in self._adjacent(front.origin) for way in self.ways_from(lane))
+            self._blind[front] = [lane for way in others for lane in way[is_first:]]
+            self._blind[front] += [lane for way in next_to for lane in way if front.lane not in self._foes(lane)]
         return self._blind[front]
 
     def behind(self, front: End, rear: End) -> list[str]:

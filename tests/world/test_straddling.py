@@ -37,6 +37,11 @@ FORK_WAYS = "".join(f'<connection from="ab" to="{to}" fromLane="0" toLane="0" co
 FORKING = """
 <trip id="ego" from="ab" to="bc" depart="0" departPos="150" departSpeed="0"/>
 <trip id="other" from="ab" to="bd" depart="4" departPos="100" departSpeed="8"/>"""
+# Two that part late, and in different places become their second lanes.
+LONG_FORK_WAYS = """
+<connection from="ab" to="bc" fromLane="0" toLane="0" contPos="10.4" shape="-7.2,-1.6 12,-2.2 19.9,0.4"/>
+<connection from="ab" to="bd" fromLane="0" toLane="0" contPos="16.3" shape="-7.2,-1.6 9,-2.7 19.9,-3.6"/>"""
+CLOSE = '<vType id="close" length="4.5" minGap="1"/>' + FORKING.replace("<trip", '<trip type="close"')
 # A side road joins another one aslant, two lanes each.
 MERGE_NODES = """
 <node id="n" x="-140" y="140"/><node id="w" x="-190" y="-60"/>
@@ -142,6 +147,14 @@ def test_who_leaves_its_lane_by_a_way_beside_the_egos_stops_behind_it_on_the_jun
 ) -> None:
     net = plain_file(FORK_NODES, FORK_EDGES, FORK_WAYS)
     assert 0.5 < min(_gaps_to_one_that_stops(tmp_path, net, FORKING, lambda lane: lane.startswith(":"), past)) < 5.0
+
+
+@pytest.mark.parametrize("past", [14.0, 15.0, 16.0, 17.0])  # [m] the front is beyond the stop line
+def test_who_is_close_behind_on_another_way_stays_behind_an_ego_that_is_on_the_second_lane_of_its_way(
+    tmp_path: Path, plain_file: Callable[..., Path], past: float
+) -> None:
+    net = plain_file(FORK_NODES, FORK_EDGES, LONG_FORK_WAYS)
+    assert 0.5 < min(_gaps_to_one_that_stops(tmp_path, net, CLOSE, lambda lane: lane.startswith(":"), past)) < 2.0
 
 
 @pytest.mark.parametrize(("aside", "stops"), [(1.5, True), (1.0, False)])  # [m] to the left of its lane's middle

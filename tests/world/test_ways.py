@@ -34,11 +34,11 @@ def ways() -> Ways:
     return Ways(lambda lane: LINKS.get(lane, []), lambda lane: FOES.get(lane, ()), adjacent.__getitem__, lambda: lanes)
 
 
-def test_who_leaves_the_same_lane_sees_one_up_to_its_second_lane(ways: Ways) -> None:
-    for lane in (":c_0_0", ":c_1_0", ":c_2_0", ":c_4_0", ":c_5_0"):
-        assert not {":c_0_0", ":c_1_0", ":c_2_0", ":c_3_0", ":c_6_0"} & {*ways.beside(End(lane, "in_0"))}
-    assert ":c_5_0" in ways.beside(End(":c_4_0", "in_0"))
-    assert ":c_4_0" in ways.beside(End(":c_5_0", "in_0"))
+def test_who_leaves_the_same_lane_sees_one_surely_only_while_both_are_on_their_first_lanes(ways: Ways) -> None:
+    assert ways.beside(End(":c_0_0", "in_0")) == [":c_5_0", ":c_1_1"]
+    assert ways.beside(End(":c_1_0", "in_0")) == [":c_4_0", ":c_5_0", ":c_1_1"]
+    assert ways.beside(End(":c_4_0", "in_0")) == [":c_1_0", ":c_2_0", ":c_5_0"]
+    assert ways.beside(End(":c_5_0", "in_0")) == [":c_0_0", ":c_4_0", ":c_1_0", ":c_1_1"]
     assert ways.beside(ON_ROAD) == []
 
 
