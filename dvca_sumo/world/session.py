@@ -134,6 +134,7 @@ class Session:
         self._shadowed: set[str] = set()  # edges for which there is a route of a shadow
         self._ways = Ways(_links_of, libsumo.lane.getInternalFoes, _adjacent_lanes, libsumo.lane.getIDList)
         self._overlaid: dict[str, list[str]] = {}  # lanes of junctions that lie on one of a road
+        self._rooms: dict[str, float] = {}  # by lane
         self._has_sublanes = float(libsumo.simulation.getOption("lateral-resolution")) > 0.0
         self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
@@ -386,7 +387,7 @@ class Session:
             beside += [*near, lane] if found in near else near
             beside += self._lying_on(lane)
         # Who comes by the ego's tail cuts bends; who comes by its front it may be waiting for.
-        rooms = dict.fromkeys(beside, ROOM) | dict.fromkeys(self._ways.behind(front, rear), 0.0)
+        rooms = {lane: self._room(lane) for lane in beside} | dict.fromkeys(self._ways.behind(front, rear), 0.0)
         if not rooms:
             return {}
         body, parts = outline(truth, shape), {}
@@ -397,6 +398,12 @@ class Session:
             if part is not None and not self._is_occupied(lane, *part, ego):
                 parts[lane] = part
         return parts
+
+    def _room(self, lane: str) -> float:
+        """How far into a lane a body may be, and not in the way [m]: buses fill theirs."""
+        if lane not in self._rooms:
+            self._rooms[lane] = ROOM if _is_for_cars(lane) else 0.0
+        return self._rooms[lane]
 
     def _lying_on(self, lane: str) -> list[str]:
         """Lanes of the junctions at the ends of a lane's road that lead onward over the lane, from and to elsewhere."""

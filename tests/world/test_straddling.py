@@ -189,6 +189,17 @@ def test_who_crosses_a_road_before_the_junction_stops_for_an_ego_there(
     assert _is_stopped_for(tmp_path, net, BULGING, lambda lane: lane == "ab_0", past) is stops
 
 
+@pytest.mark.parametrize(("who", "stops"), [("passenger", False), ("bus", True)])
+def test_a_bus_needs_all_of_a_lane_of_its_own(
+    tmp_path: Path, plain_file: Callable[..., Path], who: str, *, stops: bool
+) -> None:
+    crossing = BULGE.format(16).replace("from", f'allow="{who}" from', 1)
+    kind = '<vType id="bus" vClass="bus"/><vType id="passenger"/>'
+    traffic = kind + BULGING.replace('id="other"', f'id="other" type="{who}"')
+    net = plain_file(CROSS_NODES, BULGE_EDGES, crossing)
+    assert _is_stopped_for(tmp_path, net, traffic, lambda lane: lane == "bc_0", 17.7) is stops
+
+
 def _is_stopped_for(
     folder: Path, net: Path, traffic: str, is_there: Callable[[str], bool], past: float, aside: float = 0.0
 ) -> bool:
