@@ -402,7 +402,8 @@ class Session:
     def _room(self, lane: str) -> float:
         """How far into a lane a body may be, and not in the way [m]: buses fill theirs."""
         if lane not in self._rooms:
-            self._rooms[lane] = ROOM if _is_for_cars(lane) else 0.0
+            is_for_buses = not _is_for_cars(lane) and "bus" in libsumo.lane.getAllowed(lane)
+            self._rooms[lane] = 0.0 if is_for_buses else ROOM
         return self._rooms[lane]
 
     def _lying_on(self, lane: str) -> list[str]:

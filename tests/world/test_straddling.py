@@ -78,6 +78,9 @@ BULGE_EDGES = "".join(
 BULGING = """
 <trip id="ego" from="ab" to="bc" depart="0" departPos="150" departSpeed="0"/>
 <trip id="other" from="nb" to="bs" depart="6" departPos="100" departSpeed="8"/>"""
+WALKING = """
+<trip id="ego" from="bc" to="bc" depart="0" departPos="40" departSpeed="0"/>
+<person id="walker" depart="0" departPos="70"><walk from="bc" to="bc" arrivalPos="200"/></person>"""
 OUT, BACK = 15, 250  # steps after which it stands across the lanes, and goes back to its own
 ASIDE = 2.1  # [m] its front is over the edge then
 
@@ -198,6 +201,13 @@ def test_a_bus_needs_all_of_a_lane_of_its_own(
     traffic = kind + BULGING.replace('id="other"', f'id="other" type="{who}"')
     net = plain_file(CROSS_NODES, BULGE_EDGES, crossing)
     assert _is_stopped_for(tmp_path, net, traffic, lambda lane: lane == "bc_0", 17.7) is stops
+
+
+def test_who_walks_by_an_ego_that_is_hardly_on_the_sidewalk_walks_on(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    net = plain_file(NODES, '<edge id="bc" from="b" to="c" speed="13.9" sidewalkWidth="2"/>')
+    assert _gaps_to_one_that_stops(tmp_path, net, WALKING, lambda lane: lane == "bc_1", 60.0, -1.0)[-1] > 15.0
 
 
 def _is_stopped_for(
