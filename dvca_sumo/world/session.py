@@ -134,7 +134,7 @@ class Session:
         self._shadowed: set[str] = set()  # edges for which there is a route of a shadow
         self._ways = Ways(_links_of, libsumo.lane.getInternalFoes, _adjacent_lanes, libsumo.lane.getIDList)
         self._overlaid: dict[str, list[str]] = {}  # lanes of junctions that lie on one of a road
-        self._rooms: dict[str, float] = {}  # by lane
+        self._rooms: dict[str, float] = {}  # [m] of lanes, see `_room`
         self._has_sublanes = float(libsumo.simulation.getOption("lateral-resolution")) > 0.0
         self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for

