@@ -9,10 +9,11 @@ from dvca_sumo.messages import VehicleShape
 from dvca_sumo.roadmap import Route
 from dvca_sumo.truth import EgoTruth
 from dvca_sumo.world.entry import Entry, departure
+from dvca_sumo.world.net import is_inner
 from dvca_sumo.world.session import Motion
 from dvca_sumo.world.straddling import SLOW
 from dvca_sumo.world.vehicle import Vehicle, VehicleLimits
-from dvca_sumo.world.ways import End, is_inner
+from dvca_sumo.world.ways import End
 
 _SEARCHED = 10.0  # [m] along the route: nobody gets farther in a world step, and a route may come by again soon
 _SIDEWAYS = 0.3  # [m/s] is changing lanes

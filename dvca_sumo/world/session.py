@@ -29,11 +29,12 @@ from dvca_sumo.world.footing import Footing
 from dvca_sumo.world.inset import Inset, within
 from dvca_sumo.world.itinerary import Itinerary
 from dvca_sumo.world.lingering import Lingering
+from dvca_sumo.world.net import Link, edge_of, is_for_cars, is_inner
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 from dvca_sumo.world.setback import Setback
 from dvca_sumo.world.signals import Signals
-from dvca_sumo.world.straddling import ROOM, SLOW, outline, strip, taken
-from dvca_sumo.world.ways import End, Link, Ways, edge_of, is_inner
+from dvca_sumo.world.straddling import SLOW, Straddling
+from dvca_sumo.world.ways import End, Ways
 
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
 NEVER_TELEPORTED = "dvca.ego"  # vehicle type of an adopted ego
@@ -89,6 +90,43 @@ class _Readings(dict[str, tuple[_Seen, ...]]):
         return read
 
 
+class _Net:
+    """The road net of the simulation."""
+
+    def __init__(self) -> None:
+        self._middles: dict[str, tuple[shapely.LineString, float]] = {}
+
+    def lanes(self) -> tuple[str, ...]:
+        return tuple(libsumo.lane.getIDList())
+
+    def links(self, lane: str) -> list[Link]:
+        return [Link(to, via, way in _TURNS_BACK) for to, _, _, _, via, _, way, _ in libsumo.lane.getLinks(lane)]
+
+    def foes(self, lane: str) -> tuple[str, ...]:
+        return tuple(libsumo.lane.getInternalFoes(lane))
+
+    def adjacent(self, lane: str) -> list[str]:
+        edge, _, index = lane.rpartition("_")
+        count = libsumo.edge.getLaneNumber(edge)
+        return [f"{edge}_{next_to}" for next_to in (int(index) - 1, int(index) + 1) if 0 <= next_to < count]
+
+    def allowed(self, lane: str) -> tuple[str, ...]:
+        return tuple(libsumo.lane.getAllowed(lane))
+
+    def middle(self, lane: str) -> tuple[shapely.LineString, float]:
+        if lane not in self._middles:
+            shape = libsumo.lane.getShape(lane)
+            line = shapely.LineString([shape[0], *shape])  # of two points at least, however short the lane
+            self._middles[lane] = line, libsumo.lane.getWidth(lane)
+        return self._middles[lane]
+
+    def lanes_of(self, road: str) -> list[str]:
+        return [f"{road}_{index}" for index in range(libsumo.edge.getLaneNumber(road))]
+
+    def junctions_of(self, road: str) -> tuple[str, str]:
+        return libsumo.edge.getFromJunction(road), libsumo.edge.getToJunction(road)
+
+
 class _Adopted(msgspec.Struct):
     """What SUMO is told of an ego, and why."""
 
@@ -132,11 +170,10 @@ class Session:
         self._footing = Footing(self._walking_area)
         self._adopted: dict[str, _Adopted] = {}  # by ego
         self._shadowed: set[str] = set()  # edges for which there is a route of a shadow
-        self._ways = Ways(_links_of, libsumo.lane.getInternalFoes, _adjacent_lanes, libsumo.lane.getIDList)
-        self._overlaid: dict[str, list[str]] = {}  # lanes of junctions that lie on one of a road
-        self._rooms: dict[str, float] = {}  # [m] of lanes, see `_room`
+        self._net = _Net()
+        self._ways = Ways(self._net)
+        self._straddling = Straddling(self._net, self._ways)
         self._has_sublanes = float(libsumo.simulation.getOption("lateral-resolution")) > 0.0
-        self._middles: dict[str, tuple[shapely.LineString, float]] = {}  # of lanes, and their widths [m]
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
 
     @property
@@ -302,7 +339,7 @@ class Session:
         y = truth.y + ahead * math.sin(truth.heading)
         if found and truth.speed <= SLOW and not self._has_sublanes:
             lane, x, y = self._held(ego, lane, x, y, found)
-        middle, width = self._middle(lane)
+        middle, width = self._net.middle(lane)
         x, y = adopted.inset.at(x, y, middle, 0.5 * (width + adopted.width), is_on_lane=bool(found))
         edge, _, index = lane.rpartition("_")
         angle = 90.0 - math.degrees(truth.heading)
@@ -322,12 +359,12 @@ class Session:
         They are those where SUMO has found it, while somebody is beside it on the next lane of the road: on the same
         lane as the ego, that one would take it for a leader and stop dead, in the way of both.
         """
-        adopted, point, (middle, width) = self._adopted[ego], shapely.Point(x, y), self._middle(found)
+        adopted, point, (middle, width) = self._adopted[ego], shapely.Point(x, y), self._net.middle(found)
         most = 0.5 * width - _HELD
         is_on_its_way = lane != found or middle.distance(point) > most
         if is_on_its_way and edge_of(lane) == edge_of(found):
-            for next_to in _adjacent_lanes(found):
-                line, reach = self._middle(next_to)
+            for next_to in self._net.adjacent(found):
+                line, reach = self._net.middle(next_to)
                 front = line.project(point)
                 is_there = line.distance(point) < 0.5 * (reach + adopted.width)
                 if is_there and self._is_occupied(next_to, front - adopted.length, front, ego):
@@ -364,7 +401,7 @@ class Session:
                 road = self._ways.road_after(lane) if is_inner(lane) else edge
                 libsumo.route.add(f"{SHADOW}.{edge}", [road])
             of.add(shadow, f"{SHADOW}.{edge}", SHADOW)
-        middle, _ = self._middle(lane)
+        middle, _ = self._net.middle(lane)
         front, behind = middle.interpolate(end), middle.interpolate(max(begin, 0.0))
         angle = math.degrees(math.atan2(front.x - behind.x, front.y - behind.y))
         of.setLength(shadow, end - begin)
@@ -378,45 +415,8 @@ class Session:
         self, ego: str, truth: EgoTruth, shape: VehicleShape, ends: Sequence[End]
     ) -> dict[str, tuple[float, float]]:
         """Lanes that an ego is on, beside where SUMO has found it, and from where to where [m]."""
-        if not ends:
-            return {}
-        front, rear = ends
-        found, beside = libsumo.vehicle.getLaneID(ego), [*self._ways.beside(front)]
-        for lane in dict.fromkeys(end.lane for end in ends if not end.origin):
-            near = _adjacent_lanes(lane)
-            beside += [*near, lane] if found in near else near
-            beside += self._lying_on(lane)
-        # Who comes by the ego's tail cuts bends; who comes by its front it may be waiting for.
-        rooms = {lane: self._room(lane) for lane in beside} | dict.fromkeys(self._ways.behind(front, rear), 0.0)
-        if not rooms:
-            return {}
-        body, parts = outline(truth, shape), {}
-        for lane, room in rooms.items():
-            if lane == found:
-                continue
-            part = taken(body, *self._middle(lane), room)
-            if part is not None and not self._is_occupied(lane, *part, ego):
-                parts[lane] = part
-        return parts
-
-    def _room(self, lane: str) -> float:
-        """How far into a lane a body may be, and not in the way [m]: buses fill theirs."""
-        if lane not in self._rooms:
-            is_for_buses = not _is_for_cars(lane) and "bus" in libsumo.lane.getAllowed(lane)
-            self._rooms[lane] = 0.0 if is_for_buses else ROOM
-        return self._rooms[lane]
-
-    def _lying_on(self, lane: str) -> list[str]:
-        """Lanes of the junctions at the ends of a lane's road that lead onward over the lane, from and to elsewhere."""
-        if lane not in self._overlaid:
-            of, road, area = libsumo.edge, edge_of(lane), strip(*self._middle(lane))
-            lanes = (f"{road}_{number}" for number in range(of.getLaneNumber(road)))
-            own = {one for each in lanes for way in self._ways.ways_from(each) for one in way}
-            junctions = dict.fromkeys((of.getFromJunction(road), of.getToJunction(road)))
-            across = [one for junction in junctions for one in self._ways.onward_lanes(f":{junction}")]
-            elsewhere = (one for one in across if one not in own and self._ways.road_after(one) != road)
-            self._overlaid[lane] = [one for one in elsewhere if strip(*self._middle(one)).intersects(area)]
-        return self._overlaid[lane]
+        parts = self._straddling.parts(truth, shape, ends, libsumo.vehicle.getLaneID(ego))
+        return {lane: part for lane, part in parts.items() if not self._is_occupied(lane, *part, ego)}
 
     def _is_occupied(self, lane: str, begin: float, end: float, ego: str) -> bool:
         """Whether somebody is on that part of a lane already: who is stopped beside an ego must not stay for ever."""
@@ -499,16 +499,8 @@ class Session:
     def _walking_area(self, edge: str) -> tuple[Shape, list[Strip]]:
         """The outline of a walking area, and the lanes of vehicles at its junction."""
         of, lanes = libsumo.lane, self._ways.inner_lanes(edge_of(edge))
-        strips = [(of.getShape(lane), of.getWidth(lane)) for lane in lanes if _is_for_cars(lane)]
+        strips = [(of.getShape(lane), of.getWidth(lane)) for lane in lanes if is_for_cars(self._net, lane)]
         return of.getShape(f"{edge}_0"), strips
-
-    def _middle(self, lane: str) -> tuple[shapely.LineString, float]:
-        """A lane's centre line and width [m]."""
-        if lane not in self._middles:
-            shape = libsumo.lane.getShape(lane)
-            line = shapely.LineString([shape[0], *shape])  # of two points at least, however short the lane
-            self._middles[lane] = line, libsumo.lane.getWidth(lane)
-        return self._middles[lane]
 
     def _remind(self, ego: str, lane: str) -> None:
         """Tell SUMO the rest of an ego's trip again, as soon as it sees it, on `lane`, on the way."""
@@ -551,21 +543,6 @@ class Session:
             of = libsumo.person
             self._bodies[key] = Body(ObjectClass.PEDESTRIAN, of.getLength(name), of.getWidth(name), 0.0)
         return key
-
-
-def _links_of(lane: str) -> list[Link]:
-    return [Link(to, via, way in _TURNS_BACK) for to, _, _, _, via, _, way, _ in libsumo.lane.getLinks(lane)]
-
-
-def _is_for_cars(lane: str) -> bool:
-    return "passenger" in (libsumo.lane.getAllowed(lane) or ("passenger",))
-
-
-def _adjacent_lanes(lane: str) -> list[str]:
-    """The lanes to the left and right of a lane, of the same road."""
-    edge, _, index = lane.rpartition("_")
-    count = libsumo.edge.getLaneNumber(edge)
-    return [f"{edge}_{next_to}" for next_to in (int(index) - 1, int(index) + 1) if 0 <= next_to < count]
 
 
 def _shadow(ego: str, lane: str) -> str:

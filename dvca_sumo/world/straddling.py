@@ -5,30 +5,81 @@ turning back, between two lanes of a queue, or where ways on a junction lie side
 """
 
 import math
+from collections.abc import Sequence
 
 import shapely
 
 from dvca_sumo.geometry.boxes import box_of, corners
 from dvca_sumo.messages import VehicleShape
 from dvca_sumo.truth import EgoTruth
+from dvca_sumo.world.net import Net, edge_of, is_for_cars
+from dvca_sumo.world.ways import End, Ways
 
 SLOW = 5.0  # [m/s] above, an ego is on its way from one lane to the other, and soon on one
-ROOM = 0.4  # [m] into a lane: up to that, a car in its middle has room to pass
+_ROOM = 0.4  # [m] into a lane: up to that, a car in its middle has room to pass
 _SHORTEST = 0.1  # [m] of a lane, less is nobody's way
 
 
-def outline(truth: EgoTruth, shape: VehicleShape) -> shapely.Polygon:
-    """Where an ego's body is."""
-    return shapely.Polygon(corners(box_of(truth.x, truth.y, truth.heading, shape)[None])[0])
+class Straddling:
+    """Of which lanes of a net an ego is in the way, beside the one SUMO has it on."""
 
+    def __init__(self, net: Net, ways: Ways) -> None:
+        self._net = net
+        self._ways = ways
+        self._overlaid: dict[str, list[str]] = {}  # lanes of junctions that lie on one of a road
+        self._rooms: dict[str, float] = {}  # [m] of lanes, see `_room`
 
-def strip(middle: shapely.LineString, width: float) -> shapely.Polygon:
-    """A lane of `width` [m] along its centre line."""
-    return middle.buffer(0.5 * width, cap_style="flat", join_style="mitre")
+    def parts(
+        self, truth: EgoTruth, shape: VehicleShape, ends: Sequence[End], found: str
+    ) -> dict[str, tuple[float, float]]:
+        """From where to where on which lanes an ego is in the way [m].
+
+        Args:
+            truth: How it moves now.
+            shape: Its body.
+            ends: Where its front and its rear axle are on its route; none: it is on no second lane.
+            found: The lane that SUMO has it on.
+        """
+        rooms = {lane: room for lane, room in self._rooms_around(ends, found).items() if lane != found} if ends else {}
+        if not rooms:
+            return {}
+        body = _outline(truth, shape)
+        parts = {lane: taken(body, *self._net.middle(lane), room) for lane, room in rooms.items()}
+        return {lane: part for lane, part in parts.items() if part is not None}
+
+    def _rooms_around(self, ends: Sequence[End], found: str) -> dict[str, float]:
+        """Lanes whose drivers do not see a body at its route's `ends`, and how far into them it may be [m]."""
+        front, rear = ends
+        beside = [*self._ways.beside(front)]
+        for lane in dict.fromkeys(end.lane for end in ends if not end.origin):
+            near = self._net.adjacent(lane)
+            beside += [*near, lane] if found in near else near
+            beside += self._lying_on(lane)
+        # Who comes by the ego's tail cuts bends; who comes by its front it may be waiting for.
+        return {lane: self._room(lane) for lane in beside} | dict.fromkeys(self._ways.behind(front, rear), 0.0)
+
+    def _room(self, lane: str) -> float:
+        """How far into a lane a body may be, and not in the way [m]: buses fill theirs."""
+        if lane not in self._rooms:
+            is_for_buses = not is_for_cars(self._net, lane) and "bus" in self._net.allowed(lane)
+            self._rooms[lane] = 0.0 if is_for_buses else _ROOM
+        return self._rooms[lane]
+
+    def _lying_on(self, lane: str) -> list[str]:
+        """Lanes of the junctions at the ends of a lane's road that lead onward over the lane, from and to elsewhere."""
+        if lane not in self._overlaid:
+            net, ways, road = self._net, self._ways, edge_of(lane)
+            own = {one for each in net.lanes_of(road) for way in ways.ways_from(each) for one in way}
+            junctions = dict.fromkeys(net.junctions_of(road))
+            across = [one for junction in junctions for one in ways.onward_lanes(f":{junction}")]
+            elsewhere = (one for one in across if one not in own and ways.road_after(one) != road)
+            area = _strip(*net.middle(lane))
+            self._overlaid[lane] = [one for one in elsewhere if _strip(*net.middle(one)).intersects(area)]
+        return self._overlaid[lane]
 
 
 def taken(
-    body: shapely.Polygon, middle: shapely.LineString, width: float, room: float = ROOM
+    body: shapely.Polygon, middle: shapely.LineString, width: float, room: float = _ROOM
 ) -> tuple[float, float] | None:
     """From where to where a body is in the way on a lane of `width` [m], along its centre line [m]; None: it is not.
 
@@ -38,7 +89,7 @@ def taken(
     width = max(width - 2.0 * room, 0.0)
     if body.distance(middle) >= 0.5 * width:
         return None
-    way = strip(middle, width)
+    way = _strip(middle, width)
     stations = shapely.line_locate_point(middle, shapely.points(shapely.get_coordinates(way.intersection(body))))
     begin, end = float(stations.min(initial=math.inf)), float(stations.max(initial=0.0))
     if end - begin <= _SHORTEST:
@@ -48,3 +99,13 @@ def taken(
     origin, ahead = shapely.get_coordinates(shapely.line_interpolate_point(middle, (0.0, end)))
     along = (shapely.get_coordinates(body) - origin) @ (ahead - origin) / math.dist(ahead, origin)
     return min(begin, float(along.min())), end
+
+
+def _outline(truth: EgoTruth, shape: VehicleShape) -> shapely.Polygon:
+    """Where an ego's body is."""
+    return shapely.Polygon(corners(box_of(truth.x, truth.y, truth.heading, shape)[None])[0])
+
+
+def _strip(middle: shapely.LineString, width: float) -> shapely.Polygon:
+    """A lane of `width` [m] along its centre line."""
+    return middle.buffer(0.5 * width, cap_style="flat", join_style="mitre")

@@ -1,18 +1,8 @@
-"""Ways across junctions, and on which of their lanes SUMO's drivers do not see who is beside them.
+"""Ways across junctions, and on which of their lanes SUMO's drivers do not see who is beside them."""
 
-SUMO names a lane after its edge, and the edge of a junction's lane after the junction: ":78_12_0".
-"""
-
-from collections.abc import Callable, Collection, Iterable
 from typing import NamedTuple
 
-
-class Link(NamedTuple):
-    """How one gets from a lane to a lane of a road."""
-
-    to: str
-    via: str  # the next lane of the junction on the way there, "" where there is none
-    turns_back: bool = False
+from dvca_sumo.world.net import Connections, edge_of, is_inner
 
 
 class End(NamedTuple):
@@ -25,21 +15,8 @@ class End(NamedTuple):
 class Ways:
     """The ways of one net, found when first asked for."""
 
-    def __init__(
-        self,
-        links: Callable[[str], Iterable[Link]],
-        foes: Callable[[str], Collection[str]],
-        adjacent: Callable[[str], Iterable[str]],
-        lanes: Callable[[], Iterable[str]],
-    ) -> None:
-        """What is known of a lane, and the names of all `lanes`.
-
-        `links` are those of the lane, `foes` whom one on it minds on a junction, `adjacent` its neighbours on the road.
-        """
-        self._links = links
-        self._foes = foes
-        self._adjacent = adjacent
-        self._lanes = lanes
+    def __init__(self, net: Connections) -> None:
+        self._net = net
         self._ways: dict[str, list[list[str]]] = {}  # by lane of a road
         self._named: dict[str, list[str]] = {}  # lanes by junction, whether they lead on or not
         self._inner: dict[str, list[str]] = {}  # those that do
@@ -56,9 +33,9 @@ class Ways:
         if front not in self._blind:
             others = [way for way in self.ways_from(front.origin) if front.lane not in way]
             is_first = front.lane in {way[0] for way in self.ways_from(front.origin)}
-            next_to = (way for lane in self._adjacent(front.origin) for way in self.ways_from(lane))
+            next_to = (way for lane in self._net.adjacent(front.origin) for way in self.ways_from(lane))
             self._blind[front] = [lane for way in others for lane in way[is_first:]]
-            self._blind[front] += [lane for way in next_to for lane in way if front.lane not in self._foes(lane)]
+            self._blind[front] += [lane for way in next_to for lane in way if front.lane not in self._net.foes(lane)]
         return self._blind[front]
 
     def behind(self, front: End, rear: End) -> list[str]:
@@ -75,10 +52,10 @@ class Ways:
         """The lanes of vehicles on a junction that lead on, by the beginning of their names."""
         if junction not in self._inner:
             if not self._named:
-                for lane in self._lanes():
+                for lane in self._net.lanes():
                     if is_inner(lane) and edge_of(lane).rpartition("_")[2].isdecimal():
                         self._named.setdefault(_junction_of(lane), []).append(lane)
-            self._inner[junction] = [lane for lane in self._named.get(junction, []) if [*self._links(lane)]]
+            self._inner[junction] = [lane for lane in self._named.get(junction, []) if [*self._net.links(lane)]]
         return self._inner[junction]
 
     def onward_lanes(self, junction: str) -> list[str]:
@@ -86,16 +63,17 @@ class Ways:
 
         Hardly anybody drives those that do, and they lie across many others, on which all wait for who stands there.
         """
-        return [lane for lane in self.inner_lanes(junction) if not any(link.turns_back for link in self._links(lane))]
+        lanes, links = self.inner_lanes(junction), self._net.links
+        return [lane for lane in lanes if not any(link.turns_back for link in links(lane))]
 
     def road_after(self, lane: str) -> str:
         """The edge of a road that one of the `inner_lanes` leads to."""
-        return edge_of(next(iter(self._links(lane))).to)
+        return edge_of(next(iter(self._net.links(lane))).to)
 
     def ways_from(self, lane: str) -> list[list[str]]:
         """The lanes of a junction, way by way, by which one leaves a lane of a road, without turns back."""
         if lane not in self._ways:
-            onward = (link.via for link in self._links(lane) if link.via and not link.turns_back)
+            onward = (link.via for link in self._net.links(lane) if link.via and not link.turns_back)
             self._ways[lane] = [self._way_by(via) for via in onward]
         return self._ways[lane]
 
@@ -105,19 +83,9 @@ class Ways:
 
     def _way_by(self, lane: str) -> list[str]:
         way = [lane]
-        while onward := next((link.via for link in self._links(way[-1])), ""):
+        while onward := next((link.via for link in self._net.links(way[-1])), ""):
             way.append(onward)
         return way
-
-
-def is_inner(lane: str) -> bool:
-    """Whether a lane is one of a junction."""
-    return lane.startswith(":")
-
-
-def edge_of(lane: str) -> str:
-    """The edge of a lane."""
-    return lane.rpartition("_")[0]
 
 
 def _junction_of(lane: str) -> str:

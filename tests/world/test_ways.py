@@ -2,7 +2,8 @@
 
 import pytest
 
-from dvca_sumo.world.ways import End, Link, Ways, edge_of, is_inner
+from dvca_sumo.world.net import Link, edge_of, is_inner
+from dvca_sumo.world.ways import End, Ways
 
 LINKS = {
     "in_0": [
@@ -27,11 +28,25 @@ FOES = {":c_4_0": (":c_1_1", ":c_7_0"), ":c_1_1": (":c_4_0",), ":c_7_0": (":c_4_
 ON_ROAD = End("in_0", "")
 
 
+class Junction:
+    """The lanes of this one, and a few that lead nowhere."""
+
+    def lanes(self) -> list[str]:
+        return [*LINKS, ":c_8_0", ":c_c0_0", ":c_w0_0", ":d_0_0", "left_0"]
+
+    def links(self, lane: str) -> list[Link]:
+        return LINKS.get(lane, [])
+
+    def foes(self, lane: str) -> tuple[str, ...]:
+        return FOES.get(lane, ())
+
+    def adjacent(self, lane: str) -> list[str]:
+        return {"in_0": ["in_1"], "in_1": ["in_0"]}[lane]
+
+
 @pytest.fixture
 def ways() -> Ways:
-    lanes = [*LINKS, ":c_8_0", ":c_c0_0", ":c_w0_0", ":d_0_0", "left_0"]
-    adjacent = {"in_0": ["in_1"], "in_1": ["in_0"]}
-    return Ways(lambda lane: LINKS.get(lane, []), lambda lane: FOES.get(lane, ()), adjacent.__getitem__, lambda: lanes)
+    return Ways(Junction())
 
 
 def test_who_leaves_the_same_lane_sees_one_surely_only_while_both_are_on_their_first_lanes(ways: Ways) -> None:
