@@ -192,7 +192,7 @@ def leading(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> tuple[
     """Moving futures on the path, as rows of the graph: those that lead (or come towards) the ego, and the rest.
 
     Left out are unlikely ones that are not about to happen, and who drives behind the ego, unless it passes first where
-    the path swings out, and crosses the path then. People beside it do not lead it.
+    the path swings out, and crosses the path then. People beside it do not lead it, nor who comes by its front already.
     """
     scene, futures = graph.scene, graph.scene.futures
     leaders: list[int] = []
@@ -204,7 +204,7 @@ def leading(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> tuple[
         if scene.probabilities[row] < (config.possible if entry < config.soon else config.likely):
             continue
         is_in_lane = futures.directions[row, 0] > ALONG and graph.gaps[row, : first + 1].max() < config.object_margin
-        is_beside = scene.is_person[row] and graph.low[row, 0] < shape.front
+        is_beside = graph.low[row, 0] < shape.front and (scene.is_person[row] or futures.directions[row, 0] < -ALONG)
         if is_beside or abs(futures.directions[row, first]) < ALONG or (entry > PRESENT and not is_in_lane):
             others.append(row)
         elif futures.stations[row, 0] > shape.centre:

@@ -436,6 +436,19 @@ def test_a_standing_ego_does_not_start_towards_who_comes_past_it_with_hardly_roo
     assert driven.fronts[-1] > 120.0
 
 
+@pytest.mark.parametrize("speed", [1.0, 3.0, 6.0])
+@pytest.mark.parametrize(("x", "y"), [(103.5, 1.95), (105.0, 2.05)])
+def test_for_who_comes_by_beside_its_front_with_hardly_room_a_moving_ego_does_not_stop(
+    speed: float, x: float, y: float
+) -> None:
+    """It would not get farther from the other's way, but stay beside it for longer."""
+    coming = car(3, x, y, heading=-math.pi, speed=2.0)
+    driven = drive(road(), 4.0, station=100.0, speed=speed, actors=[coming])
+    assert driven.clearances[0] < PlanningConfig().object_margin
+    assert driven.states[:, 5].min() > -PlanningConfig().comfort_braking
+    assert driven.speeds.min() >= speed - 0.1
+
+
 def test_stream_with_priority_is_waited_for_at_the_line() -> None:
     stream = [car(k, 106.0, -60.0 - 25.0 * k, heading=UP, speed=10.0, lanes=("major_0",)) for k in range(8)]
     driven = drive(road(stop_lines=[stop_line(100.0, Control.YIELD)]), 40.0, speed=13.0, actors=stream)
