@@ -45,6 +45,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bicycle_margin: float = 0.6  # [m] bicycles sway
     person_margin: float = 0.35  # [m] of people who stand or walk along the road ...
     creeping_speed: float = 1.5  # [m/s] ... but slower, `object_margin` of those who stand, at walking pace
+    setting_off_margin: float = 0.5  # [m] of people who walk, for an ego that stands
     person_least: float = 0.25  # [m] of people who stand beside the body: it stays until they go
     crossing_person_margin: float = 1.0  # [m] of people who walk across
     crossing_margin: float = 2.0  # [m] of people who walk across at a pedestrian crossing

@@ -18,6 +18,7 @@ from dvca_sumo.stack.planning.staying import Staying
 
 _COMMITTED = 0.5  # of the offset: from there on it is safer to go on than to go back
 _UNSURE = 0.08  # [m] less room than wanted at least does not end a nudge: noise, and still more than what is in the way
+_SHARES = (2.0 / 3.0, 1.0 / 3.0, 0.0)  # of the way from the least clearance to the wanted one
 _AT = 0.05  # [m] from an offset, the ego is at it
 
 
@@ -210,7 +211,7 @@ class NudgeDecider:
         """Offsets to pass at, best first: on the side of the last cycle if that still works, else the smaller one.
 
         While there is no room beside for the wanted clearance, the room that the lane leaves will do if it is enough,
-        or else the least clearance.
+        or else part of it, down to the least clearance: some of it can be reached in time.
         """
         hold, least = self._config.nudge_hold, self._config.nudge_clearance_least
         if blocker.track in self._held:
@@ -234,8 +235,9 @@ class NudgeDecider:
             yield from (self._sparing(blocker, offset, situation) for offset in inside if self._clears(blocker, offset))
         for offset in wanted:
             tight = self._tightened(blocker, offset)
-            if (may_pass and room.is_in_lane(tight)) or self._may_leave_lane(blocker, tight, begun, situation):
-                yield tight
+            for less in (tight + share * (offset - tight) for share in _SHARES):
+                if (may_pass and room.is_in_lane(less)) or self._may_leave_lane(blocker, less, begun, situation):
+                    yield held if abs(less - held) < hold and self._clears(blocker, held) else less
 
     def _held_offset(self, track: int) -> float:
         """The offset of the last cycle; 0 without one."""

@@ -158,7 +158,8 @@ def _margins(
     """(h,) sideways distance within which a future counts as in the way [m].
 
     It is wider for people who walk across, unless they stay clear of the ego's way or walk away from it. Past people
-    who stand an ego creeps that is slow already; they may be waiting for it.
+    who stand an ego creeps that is slow already; they may be waiting for it. Who walks, and sways, is left more room by
+    an ego that stands: it can wait.
     """
     classes = scene.classes[scene.owners]
     margins = np.where(classes == _BICYCLE, config.bicycle_margin, config.object_margin)
@@ -172,6 +173,8 @@ def _margins(
     margins[people] = config.person_margin
     if speed < config.creeping_speed:
         margins[scene.moving :][people[scene.moving :]] = config.object_margin
+    if speed < config.standing_speed:
+        margins[: scene.moving][people[: scene.moving]] = config.setting_off_margin
     margins[across] = config.crossing_person_margin
     for crossing in crossings:
         begin, end = crossing.start_station - AT_CROSSING, crossing.end_station + AT_CROSSING

@@ -290,6 +290,32 @@ def test_no_room_is_made_for_who_is_met_before_there_can_be_any(ahead: float) ->
     assert driven.fronts[-1] > 60.0
 
 
+@pytest.mark.parametrize("beside", [-1.6, -1.75])
+def test_where_there_is_no_time_for_all_the_room_wanted_the_ego_makes_part_of_it(beside: float) -> None:
+    walker = person(5, 20.0 + SHAPE.front + 6.0, beside, heading=math.pi, speed=1.3)
+    driven = drive(road(limit=8.0), 10.0, station=20.0, speed=6.0, actors=[walker])
+    centred = -beside - 0.5 * (SHAPE.width + 0.6)
+    assert driven.clearances.min() > centred + 0.25
+    assert_drivable(driven)
+    assert driven.fronts[-1] > 80.0
+
+
+@pytest.mark.parametrize(("heading", "ahead"), [(math.pi, 1.0), (math.pi, 3.0), (0.0, 0.0)])
+@pytest.mark.parametrize("gap", [0.4, 0.45])
+def test_ego_that_stands_does_not_set_off_while_somebody_walks_close_by_its_front(
+    heading: float, ahead: float, gap: float
+) -> None:
+    def setting_off(gap: float) -> int:
+        y = -(0.5 * (SHAPE.width + 0.6) + gap)
+        walker = person(5, 20.0 + SHAPE.front + ahead, y, heading=heading, speed=1.3)
+        driven = drive(road(limit=8.0), 12.0, station=20.0, actors=[walker])
+        assert driven.fronts[-1] > 80.0
+        return int((driven.speeds > 0.3).argmax())
+
+    assert setting_off(0.65) < 6
+    assert setting_off(gap) >= 10
+
+
 @pytest.mark.parametrize("beside", [-1.35, -1.0])
 def test_lane_that_gets_narrower_is_not_left_for_who_walks_along_it(beside: float) -> None:
     straight = road(limit=8.0, lanes_left=1)
