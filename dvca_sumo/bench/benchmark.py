@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 
 from dvca_sumo.bench.cases import Case
+from dvca_sumo.bench.places import contents_of
 from dvca_sumo.bench.runs import Setting, analysed
 from dvca_sumo.bench.score import FAILED, Score
 from dvca_sumo.report.result import versions
@@ -35,4 +36,6 @@ def run_benchmark(
 
 def question_key(case: Case, setting: Setting) -> str:
     """Under which the score of a case is kept."""
-    return key_of([case, setting.seed, setting.repeats, setting.has_controls, setting.baselines, versions()])
+    contents = [contents_of(scenario) for scenario in (case.scenario, case.harmless_scenario) if scenario]
+    asked = (setting.seed, setting.repeats, setting.has_controls, setting.baselines)
+    return key_of([case, contents, asked, versions()])

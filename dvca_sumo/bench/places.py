@@ -11,9 +11,10 @@ import numpy as np
 from dvca_sumo import api
 from dvca_sumo.bench.runs import TIMEOUT, Setting, driven
 from dvca_sumo.engine.processes import Failure, isolated
+from dvca_sumo.installation import scenario_path
 from dvca_sumo.record import Record
 from dvca_sumo.report.result import versions
-from dvca_sumo.scenario import AUTO, Scenario, ScenarioError, last_departure
+from dvca_sumo.scenario import AUTO, Scenario, ScenarioError, last_departure, read_configuration
 from dvca_sumo.store import Store, key_of
 from dvca_sumo.violations import Answer, Ending
 
@@ -66,6 +67,14 @@ def places_of(sumocfg: Path, ego: str | None, begin: float | None) -> tuple[Plac
     return tuple(Place(str(sumocfg), AUTO, time) for time in _spread(scenario))
 
 
+def contents_of(scenario: str) -> tuple[str, ...]:
+    """Digests of the files that a drive in `scenario` is read from; none of what cannot be read: its run says why."""
+    try:
+        return read_configuration(scenario_path(Path(scenario))).contents
+    except ScenarioError:
+        return ()
+
+
 def healthy_drives(
     places: Sequence[Place], setting: Setting, jobs: int, store: Store[HealthyDrive] | None
 ) -> list[HealthyDrive]:
@@ -74,7 +83,7 @@ def healthy_drives(
     Raises:
         ScenarioError: None of them is clean; the first one's complaint is told.
     """
-    keys = [key_of([place, setting.seed, setting.repeats, versions()]) for place in places]
+    keys = [key_of([place, contents_of(place.scenario), setting.seed, setting.repeats, versions()]) for place in places]
     known = {row: kept for row, key in enumerate(keys) if store and (kept := store.find(key))}
     rows = [row for row in range(len(places)) if row not in known]
     for number, answer in isolated([partial(_healthy, places[row], setting) for row in rows], jobs, TIMEOUT):

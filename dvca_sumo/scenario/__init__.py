@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from dvca_sumo.scenario.configuration import Configuration, read_configuration, seconds
+from dvca_sumo.scenario.configuration import Configuration, content_of, read_configuration, seconds
 from dvca_sumo.scenario.departures import last_departure
 from dvca_sumo.scenario.ego import AUTO, Definitions, find_ego
 from dvca_sumo.scenario.errors import ScenarioError
@@ -19,9 +19,11 @@ __all__ = [
     "Override",
     "Scenario",
     "ScenarioError",
+    "content_of",
     "input_words",
     "last_departure",
     "load_scenario",
+    "read_configuration",
     "silenced",
 ]
 

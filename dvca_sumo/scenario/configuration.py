@@ -1,9 +1,11 @@
 """A user's sumocfg: which files it reads, which options it sets, which outputs it asks for."""
 
 import difflib
+import hashlib
 import math
 import re
 import xml.etree.ElementTree as ET
+from functools import cache
 from pathlib import Path
 
 import msgspec
@@ -78,6 +80,11 @@ class Configuration(msgspec.Struct, frozen=True):
         """Names of the set options that would make SUMO write a file."""
         return tuple(name for name in self.options if name in OUTPUTS or name.endswith("-output"))
 
+    @property
+    def contents(self) -> tuple[str, ...]:
+        """Digests of the sumocfg and of its input files: those of a copy are equal, wherever it is and however old."""
+        return tuple(content_of(path) for path in (self.path, self.net, *self.routes, *self.additionals))
+
 
 def read_configuration(path: Path) -> Configuration:
     """Read a sumocfg.
@@ -115,6 +122,18 @@ def read_configuration(path: Path) -> Configuration:
         routes=_files(path, options, "route-files"),
         additionals=_files(path, options, "additional-files"),
     )
+
+
+def content_of(path: Path) -> str:
+    """Digest of a file's bytes."""
+    status = path.stat()
+    return _content(path, status.st_size, status.st_mtime_ns)
+
+
+@cache
+def _content(path: Path, _size: int, _modified: int) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "blake2b").hexdigest()
 
 
 def seconds(text: str, option: str) -> float:

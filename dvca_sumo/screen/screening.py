@@ -11,7 +11,7 @@ from dvca_sumo.engine.replay import raised, roadmap
 from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.oracles.no_progress import NoProgress
 from dvca_sumo.report.result import versions
-from dvca_sumo.scenario import Scenario, ScenarioError
+from dvca_sumo.scenario import Scenario, ScenarioError, content_of
 from dvca_sumo.screen.anchor import anchored
 from dvca_sumo.screen.driving import Driven, Heard, driven, planned
 from dvca_sumo.screen.judging import Fault, Judged
@@ -199,13 +199,10 @@ class _Work:
 
 
 def _key(setting: Setting, *question: object) -> str:
-    scenario = setting.scenario
-    files = [scenario.configuration.net, *scenario.configuration.routes, *scenario.configuration.additionals]
-    if setting.source.stack is not None and setting.source.is_reference:
-        files.append(Path(setting.source.stack))
-    stamps = [(str(path), path.stat().st_size, path.stat().st_mtime_ns) for path in files]
-    asked = (scenario.seed, scenario.begin, scenario.end, setting.source, versions())
-    return key_of([scenario.arguments, stamps, asked, question])
+    scenario, source = setting.scenario, setting.source
+    changes = [content_of(Path(source.stack))] if source.stack is not None and source.is_reference else []
+    asked = (scenario.seed, scenario.begin, scenario.end, source, versions())
+    return key_of([scenario.configuration.contents, scenario.overrides, changes, asked, question])
 
 
 def excused(result: TripResult, native: TripResult) -> TripResult:

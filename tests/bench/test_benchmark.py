@@ -1,10 +1,12 @@
 """Interrupted and broken benchmarks: what is known stays known, what failed is tried again."""
 
 import json
+import os
 import sys
 from pathlib import Path
 
 import pytest
+from small_scenarios import scenario_file
 
 from bench.scores import score
 from dvca_sumo.bench import benchmark
@@ -69,6 +71,29 @@ def test_other_seeds_and_modes_are_other_questions(tmp_path: Path, monkeypatch: 
     for _ in range(2):
         assert len(run_benchmark(CASES[:1], settings, 1, Store(tmp_path / "s", Score), ignore)) == 3
     assert asked == settings
+
+
+def test_a_scenario_that_was_edited_is_another_question_and_a_touched_one_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def noting(cases, setting, jobs):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202, ARG001
+        asked.extend(case.name for case in cases)
+        yield from ((row, score(case.name)) for row, case in enumerate(cases))
+
+    monkeypatch.setattr(benchmark, "analysed", noting)
+    (tmp_path / "some.net.xml").write_text("<net/>")
+    config = scenario_file(tmp_path, tmp_path / "some.net.xml")
+    case = Case("injected", "own", str(config), Component.PERCEPTION, fault="perception.miss")
+    for edit in (
+        lambda: None,
+        lambda: os.utime(config, (0.0, 0.0)),
+        lambda: scenario_file(tmp_path, config, "<!-- -->"),
+    ):
+        edit()
+        run_benchmark([case], [Setting()], 1, Store(tmp_path / "s", Score), ignore)
+    assert asked == ["own", "own"]
 
 
 def test_a_case_that_cannot_be_run_is_no_success_and_says_why() -> None:

@@ -1,5 +1,7 @@
 """A sumocfg as SUMO reads it: option names, times, the files it names, and what cannot be run."""
 
+import os
+import shutil
 import subprocess
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -95,6 +97,20 @@ def test_lists_of_files_are_taken_apart_and_relative_to_the_configuration(tmp_pa
     routes = read_configuration(config).routes
     assert [path.name for path in routes] == ["one.rou.xml", "two words.rou.xml", "routes.rou.xml"]
     assert all(path.is_absolute() for path in routes)
+
+
+def test_contents_are_those_of_a_copy_and_change_with_any_of_the_files(tmp_path: Path, net: Path) -> None:
+    config = scenario_file(tmp_path / "a", net, additional="<poly/>")
+    contents = read_configuration(config).contents
+    copy = Path(shutil.copytree(tmp_path / "a", tmp_path / "b")) / config.name
+    os.utime(copy, (0.0, 0.0))
+    assert read_configuration(copy).contents == contents
+    for name in ("run.sumocfg", "routes.rou.xml", "extra.add.xml", "../some.net.xml"):
+        path = tmp_path / "b" / name
+        before = path.read_text()
+        path.write_text(before + "<!-- -->")
+        assert read_configuration(copy).contents != contents, name
+        path.write_text(before)
 
 
 def test_outputs_are_found_under_every_name(tmp_path: Path, net: Path) -> None:

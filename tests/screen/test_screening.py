@@ -63,6 +63,8 @@ def test_the_healthy_stack_is_clean_and_goes_on_from_what_was_kept(tmp_path: Pat
     assert ads.travel_time_ratio.count == 2
     assert 0.8 < (ads.travel_time_ratio.median or 0.0) < 1.8
     assert heard.simulations == 3
+    copy = traffic(tmp_path / "copy", street, ROUTES)
+    assert screening_of(copy, folder=tmp_path / "kept", progress=again).ads == screening.ads
     assert json_of(screening_of(scenario, folder=tmp_path / "kept", progress=again)) == json_of(screening)
     assert again.simulations == 0
 
