@@ -82,7 +82,8 @@ def screen(
 
     A trip is drivable when its vehicle is a car, its route is 300 m or longer and can be driven, and SUMO's own driver
     is over it before the end, and well before an ego's patience is; stops on the way are made by nobody who drives it.
-    An interrupted screening goes on where it stopped when it is given the same folder again.
+    An interrupted screening goes on where it stopped when it is given the same folder again; of a stack of your own,
+    while its Python files are the same.
 
     \b
     Exit codes: 0 nothing violated by the ADS's own doing; 1 something was; 2 usage; 3 bad input;

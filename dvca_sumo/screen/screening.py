@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 
 import msgspec
 
@@ -18,7 +17,7 @@ from dvca_sumo.screen.judging import Fault, Judged
 from dvca_sumo.screen.neighbours import Neighbours, together
 from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.trips import SLOWER, Draw, Trip, drawn
-from dvca_sumo.stack.sources import StackSource, stack_factory
+from dvca_sumo.stack.sources import StackSource, files_of, stack_factory
 from dvca_sumo.store import Store, key_of
 
 _TIMEOUT = 6 * 3600.0  # [s] of wall time for one simulation: only a hang takes so long
@@ -200,9 +199,9 @@ class _Work:
 
 def _key(setting: Setting, *question: object) -> str:
     scenario, source = setting.scenario, setting.source
-    changes = [content_of(Path(source.stack))] if source.stack is not None and source.is_reference else []
+    stack = sorted((name, content_of(path)) for name, path in files_of(source).items())
     asked = (scenario.seed, scenario.begin, scenario.end, source, versions())
-    return key_of([scenario.configuration.contents, scenario.overrides, changes, asked, question])
+    return key_of([scenario.configuration.contents, scenario.overrides, stack, asked, question])
 
 
 def excused(result: TripResult, native: TripResult) -> TripResult:

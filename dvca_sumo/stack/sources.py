@@ -54,6 +54,26 @@ def stack_factory(source: StackSource) -> StackFactory:
     return built_checked(stack, factory)
 
 
+def files_of(source: StackSource) -> dict[str, Path]:
+    """By name, what the stack is made of beside this package, its factory being imported already.
+
+    That is a file of parameters; or the factory's module, and the Python files imported so far that lie where it or its
+    package does. What else a user's stack reads is not known.
+    """
+    if source.stack is None:
+        return {}
+    if source.is_reference:
+        return {"parameters": Path(source.stack)}
+    name = source.stack.partition(":")[0]
+    place = sys.modules[name].__file__
+    if place is None:
+        return {}
+    root = Path(place).resolve().parents[name.count(".") + (Path(place).stem == "__init__")]
+    paths = [Path(file).resolve() for module in [*sys.modules.values()] if (file := getattr(module, "__file__", None))]
+    beside = [path for path in paths if path.is_relative_to(root) and path.is_file()]  # of an archive, none is
+    return {path.relative_to(root).as_posix(): path for path in beside}
+
+
 def built_checked(source: str, factory: StackFactory) -> StackFactory:
     """`factory`, whose failures and wrong results are named as its own."""
 

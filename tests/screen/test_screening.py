@@ -69,6 +69,27 @@ def test_the_healthy_stack_is_clean_and_goes_on_from_what_was_kept(tmp_path: Pat
     assert again.simulations == 0
 
 
+def test_a_stack_of_ones_own_is_driven_again_once_any_of_its_files_is_edited(
+    tmp_path: Path, street: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    package = tmp_path / "edited_ads"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "parts.py").write_text("from small_stacks import standing\n")
+    (package / "whole.py").write_text("from edited_ads.parts import standing as build\n")
+    scenario, simulations = traffic(tmp_path, street, ROUTES), []
+    for edit in ("", "", "# edited"):
+        with (package / "parts.py").open("a") as file:
+            file.write(edit)
+        heard = Heard()
+        screening_of(scenario, "edited_ads.whole:build", tmp_path / "kept", heard)
+        simulations.append(heard.simulations)
+    assert simulations[0] > 0
+    assert simulations[1] == 0
+    assert simulations[2] == simulations[0]
+
+
 def test_what_is_said_as_data(reckless: Screening) -> None:
     said = json.loads(json.dumps(json_of(reckless), allow_nan=False))
     assert said["schema"] == 1
