@@ -87,6 +87,11 @@ class _Work:
         self._jobs = jobs
         self._stores = stores
         self._progress = progress
+        # Once: what is imported later does not make it another question.
+        stack = sorted((name, content_of(path)) for name, path in files_of(setting.source).items())
+        scenario = setting.scenario
+        asked = (scenario.seed, scenario.begin, scenario.end, setting.source, versions())
+        self._asked = [scenario.configuration.contents, scenario.overrides, stack, asked]
 
     def screening(self) -> Screening:
         draw = self._draw()
@@ -113,7 +118,7 @@ class _Work:
     def _draw(self) -> Draw:
         setting = self._setting
         window = msgspec.structs.replace(setting.scenario, end=setting.window_end or setting.scenario.end)
-        key = _key(setting, "draw", setting.egos, window.end)
+        key = key_of([self._asked, "draw", setting.egos, window.end])
         known = self._stores.draws and self._stores.draws.find(key)
         if known:
             return known
@@ -171,7 +176,7 @@ class _Work:
     ) -> list[Driven | Failure]:
         """Simulate each batch by its driver, or find what came of it before."""
         keys = [
-            _key(self._setting, driver, [trip.ego for trip in batch], concurrent)
+            key_of([self._asked, driver, [trip.ego for trip in batch], concurrent])
             for driver, batch in zip(drivers, batches, strict=True)
         ]
         store = self._stores.simulations
@@ -195,13 +200,6 @@ class _Work:
         if driver == "sumo":
             return partial(anchored, setting.scenario, batch, hear)
         return partial(driven, setting.scenario, setting.source, batch, concurrent, hear)
-
-
-def _key(setting: Setting, *question: object) -> str:
-    scenario, source = setting.scenario, setting.source
-    stack = sorted((name, content_of(path)) for name, path in files_of(source).items())
-    asked = (scenario.seed, scenario.begin, scenario.end, source, versions())
-    return key_of([scenario.configuration.contents, scenario.overrides, stack, asked, question])
 
 
 def excused(result: TripResult, native: TripResult) -> TripResult:
