@@ -95,10 +95,10 @@ def blockers(
     near = (scene.is_standing | is_beside | walks) & _may_be_passed_closer(limits, scene, window, shape)
     if not near.any():
         return [], _NOBODY
-    near &= _beside(scene, window, near).clearances(0.0) < limits
+    beside = _beside(scene, window, near | scene.is_standing)
+    near &= beside.clearances(0.0) < limits
     if not near.any():
         return [], _NOBODY
-    beside = _beside(scene, window, near | scene.is_standing)
     met = _met(now.stations, np.where(walks, scene.speeds * now.directions, 0.0), speed, config.acceleration)
     lows = np.minimum(now.stations, met) - now.half_lengths
     highs = met + now.half_lengths
