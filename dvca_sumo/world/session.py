@@ -383,7 +383,10 @@ class Session:
             ends: Where its front and its rear axle are on its route; none: it is on no second lane.
         """
         adopted = self._adopted[ego]
-        parts = {} if self._has_sublanes else self._straddled(ego, truth, shape, ends)
+        parts = {}
+        if not self._has_sublanes:
+            taken = self._straddling.parts(truth, shape, ends, libsumo.vehicle.getLaneID(ego))
+            parts = {lane: part for lane, part in taken.items() if not self._is_occupied(lane, *part, ego)}
         for lane in adopted.shadows:
             if lane not in parts:
                 self._take_away(_shadow(ego, lane))
@@ -410,13 +413,6 @@ class Session:
     def _take_away(self, shadow: str) -> None:
         if self.has(shadow):
             libsumo.vehicle.remove(shadow)
-
-    def _straddled(
-        self, ego: str, truth: EgoTruth, shape: VehicleShape, ends: Sequence[End]
-    ) -> dict[str, tuple[float, float]]:
-        """Lanes that an ego is on, beside where SUMO has found it, and from where to where [m]."""
-        parts = self._straddling.parts(truth, shape, ends, libsumo.vehicle.getLaneID(ego))
-        return {lane: part for lane, part in parts.items() if not self._is_occupied(lane, *part, ego)}
 
     def _is_occupied(self, lane: str, begin: float, end: float, ego: str) -> bool:
         """Whether somebody is on that part of a lane already: who is stopped beside an ego must not stay for ever."""
