@@ -12,8 +12,11 @@ def folder(name: str) -> Path:
 
 
 def scenario_path(path: Path) -> Path:
-    """`path` itself, or the built-in scenario that it names (`nets/cs1.sumocfg`) when there is no such file."""
+    """`path` itself, or the built-in scenario that it names (`nets/cs1.sumocfg`) when there is no such file.
+
+    Without a folder `nets` the built-in ones are meant, so that the nearest of them can be told.
+    """
     if path.exists() or path.is_absolute() or path.parts[:1] != ("nets",):
         return path
     built_in = folder("nets") / Path(*path.parts[1:])
-    return built_in if built_in.exists() else path
+    return built_in if built_in.exists() or not path.parent.is_dir() else path

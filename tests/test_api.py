@@ -78,6 +78,16 @@ def test_a_built_in_scenario_is_found_from_any_folder(tmp_path: Path, monkeypatc
     assert dvca_sumo.load_scenario(Path(CS5)).configuration.path.name == "cs5.sumocfg"
 
 
+def test_a_built_in_scenario_misspelt_is_told_its_nearest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ScenarioError, match=r"no such SUMO configuration: .*cs5\.sumo \(did you mean cs5\.sumocfg\?\)"):
+        dvca_sumo.load_scenario("nets/cs5.sumo")
+    (tmp_path / "nets").mkdir()
+    (tmp_path / "nets" / "my5.sumocfg").touch()
+    with pytest.raises(ScenarioError, match=r"did you mean my5\.sumocfg\?"):
+        dvca_sumo.load_scenario("nets/my5.sumo")
+
+
 def test_errors_are_named_for_what_was_wrong(tmp_path: Path) -> None:
     scenario = dvca_sumo.load_scenario(CS5)
     with pytest.raises(ScenarioError, match="no such SUMO configuration"):
