@@ -7,7 +7,7 @@ import numpy as np
 from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
-from dvca_sumo.stack.planning.scene import Flags
+from dvca_sumo.stack.planning.scene import ALONG, Flags
 from dvca_sumo.stack.planning.st_graph import Graph
 
 _SOON = int(np.searchsorted(PREDICTION_TIMES, 3.0))
@@ -24,7 +24,7 @@ class Ahead(NamedTuple):
     fronts: Floats  # (n,)
     stands: Flags  # (n,) or creeps
     is_vehicle: Flags  # (n,)
-    is_there: Flags  # (n,) now
+    is_across: Flags  # (n,) there now, and not about to go on along the path
 
 
 def ahead(graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfig) -> Ahead:
@@ -44,7 +44,9 @@ def ahead(graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfi
     rows, ways = rows[slowest[firsts]], ways[slowest[firsts]]
     begun = np.array(graph.first, dtype=np.int64)[rows]
     rears, fronts = graph.low[rows, begun] - shape.front, graph.high[rows, begun] - shape.front
-    return Ahead(rears, fronts, ways < _CREEPS, ~scene.is_person[rows], graph.occupied[rows, 0])
+    owners, stands, is_person = scene.owners[rows], ways < _CREEPS, scene.is_person[rows]
+    is_across = np.where(is_person, stands, scene.is_standing[owners] & (scene.now.directions[owners] < ALONG))
+    return Ahead(rears, fronts, stands, ~is_person, is_across & graph.occupied[rows, 0])
 
 
 def _met(rows: Integers, graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfig) -> Flags:
@@ -66,15 +68,16 @@ def is_blocked(
 
     That place, `distance` [m] ahead of the front bumper, is the line, or where one lets others pass on the junction.
 
-    It is when one of `those` stands on the junction who is no vehicle: vehicles there go on. And when it would not fit
-    between the junction and the first one who stands beyond it, after all who drive there before the ego have
-    closed up. It is not any more where it could hardly stop.
+    It is when one of `those` is on the junction across its way: people, or a vehicle that stands, waiting for others or
+    for the ego itself. A vehicle there that heads its way, or moves, goes on. And it is when the ego would not fit
+    between the junction and the first one who stands beyond it, after all who drive there before it have closed up. It
+    is not any more where it could hardly stop.
     """
     if not view.line.crosses or distance <= 0.0 or speed * speed > 2.0 * _BRAKING * distance:
         return False
     leave = view.exit_distance
     inside = (those.rears > distance) & (those.rears <= leave)
-    if (those.stands & ~those.is_vehicle & those.is_there & inside).any():
+    if (those.is_across & inside).any():
         return True
     beyond = those.stands & (those.rears > leave)
     if not beyond.any():

@@ -537,6 +537,25 @@ def test_car_that_has_to_wait_is_passed(x: float) -> None:
     assert driven.speeds.min() > 12.9
 
 
+@pytest.mark.parametrize(
+    ("heading", "is_waited_for"),
+    [
+        (UP, True),
+        (math.pi - 0.8, True),  # turns left, from where the ego is going
+        (0.3, False),  # drives the ego's way
+    ],
+)
+def test_a_junction_is_not_entered_while_somebody_stands_on_it_across_the_way(
+    heading: float,
+    is_waited_for: bool,  # noqa: FBT001
+) -> None:
+    """Who stands there waits for others, who would wait for an ego on the junction: nobody would get on."""
+    line = stop_line(100.0, Control.PRIORITY, yields_to=frozenset(), exit_station=120.0)
+    driven = drive(road(stop_lines=[line]), 15.0, speed=10.0, station=40.0, actors=[car(3, 114.0, heading=heading)])
+    assert driven.speeds[-1] == 0.0
+    assert bool(driven.fronts[-1] < 100.0) is is_waited_for
+
+
 def test_who_should_have_waited_is_stopped_for_before_its_way_not_at_the_line() -> None:
     """The ego has priority: at the line it would only hold up those behind it."""
     late = car(3, 112.0, -2.5, heading=UP, speed=0.8, lanes=("minor_0",))
