@@ -1,4 +1,4 @@
-"""Junctions that are kept clear: the ego enters one where it finds room behind the queue beyond."""
+"""Junctions that are kept clear: the ego enters one across which nobody stands, and that it finds room beyond."""
 
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ class Ahead(NamedTuple):
     fronts: Floats  # (n,)
     stands: Flags  # (n,) or creeps
     is_vehicle: Flags  # (n,)
-    is_across: Flags  # (n,) there now, and not about to go on along the path
+    is_across: Flags  # (n,) people there now, and vehicles that stand there and do not head the path's way
 
 
 def ahead(graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfig) -> Ahead:
