@@ -9,14 +9,12 @@ import numpy as np
 from dvca_sumo.messages import VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView, has_priority
-from dvca_sumo.stack.planning.reference import BEHIND
 from dvca_sumo.stack.planning.scene import ALONG, SOON, SOON_TIME, Flags
 from dvca_sumo.stack.planning.speed import HARD_GAP, STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import PRESENT, Graph
 
 _SPEEDS_UP = 0.4  # [m/s] faster over the next second than now
 _CUTS_IN = 0.5  # [m] moved sideways before the meeting: the other comes into our lane, not we into theirs
-_OFF_LANE = 0.5  # [m] of the body beyond the edge of its lane, by the line, not by what it swerves for
 _STAYS = 2  # columns of the graph, after which somebody is on the path to drive along it
 _STILL_TO_CROSS = 2  # lanes of a person's future: a pavement, then a crossing
 _LEAST_ROOM = 0.1  # [m]
@@ -37,9 +35,9 @@ class Demand(msgspec.Struct, frozen=True):
 class Meetings:
     """Decides about the futures that cross or join the path; remembers whom the ego passes in front of."""
 
-    def __init__(self, lanes: Iterable[str], shape: VehicleShape, config: PlanningConfig) -> None:
+    def __init__(self, lanes: frozenset[str], shape: VehicleShape, config: PlanningConfig) -> None:
         """`lanes` are those of the ego's route."""
-        self._lanes = frozenset(lanes)
+        self._lanes = lanes
         self._shape = shape
         self._config = config
         self._passing: frozenset[int] = frozenset()
@@ -161,15 +159,8 @@ class Meetings:
         if told is not None:
             return told
         keeps_lane = bool(scene.lanes[row]) and self._lanes.isdisjoint(scene.lanes[row])
-        return True if keeps_lane or self._is_off_lane(row, graph) or not self._cuts_in(row, graph) else None
-
-    def _is_off_lane(self, row: int, graph: Graph) -> bool:
-        """Whether the line is off its lane here, or where the two ways meet."""
-        window, futures, first = graph.window, graph.scene.futures, graph.first[row]
-        middle, half = futures.stations[row, first], futures.half_lengths[row, first]
-        rows = [BEHIND, *window.index(np.array([middle - half, middle, middle + half])).tolist()]
-        room = min(float(window.lane_left[rows].min()), -float(window.lane_right[rows].max()))
-        return 0.5 * self._shape.width - room > _OFF_LANE
+        is_off_lane = graph.is_off_lane(row, self._shape.width)
+        return True if keeps_lane or is_off_lane or not self._cuts_in(row, graph) else None
 
     def _cuts_in(self, row: int, graph: Graph) -> bool:
         futures, first = graph.scene.futures, graph.first[row]

@@ -58,7 +58,8 @@ class Planner:
         self._nudging = NudgeDecider(shape, config)
         self._settling = Settling(shape, config)
         self._standing = Standing()
-        self._meetings = Meetings(route.lane_ids, shape, config)
+        self._lanes = frozenset(route.lane_ids)
+        self._meetings = Meetings(self._lanes, shape, config)
         self._previous: Trajectory | None = None
         self._station: float | None = None  # of the start state of the last cycle
 
@@ -142,7 +143,7 @@ class Planner:
         caps = speed_caps(start.speed, graph, views, self._route.crossings, shape, config)
         if abs(math.remainder(start.heading - float(graph.path.headings[0]), 2.0 * math.pi)) > _ASTRAY:
             caps = [min(cap, config.astray_speed) for cap in caps]
-        leaders, others = leading(graph, shape, config)
+        leaders, others = leading(graph, self._lanes, shape, config)
         if choice.behind:
             others = [row for row in others if graph.track(row) not in choice.behind]
         leader = leader_of(leaders, graph, shape)

@@ -21,6 +21,7 @@ _NEVER = 1e4  # [m] for places where there is no leader
 _LANE_ROOM = 0.3  # [m] of lane beside the ego's width that is enough for `trusts_lane_room`
 _DOUBT = 1.0  # [m] gaps to what stands, and overlaps, up to which its outline is looked at
 _PARTS = 12  # of each side of an outline
+_OFF_LANE = 0.5  # [m] of the body beyond the edge of its lane, by the line, not by what it swerves for
 _GRAZING = 0.6  # [m] of overlap of who moves and the body, up to which the outline is looked at
 _BRIDGE = 20.0  # [m] of path under a bridge, before and after the middle of a lane on it
 
@@ -44,6 +45,14 @@ class Graph(msgspec.Struct, frozen=True, eq=False):
         """Id of the object whose future row `row` is."""
         track: int = self.scene.ids[self.scene.owners[row]]
         return track
+
+    def is_off_lane(self, row: int, width: float) -> bool:
+        """Whether the line takes the ego, so wide [m], off its lane here, or where future `row` meets it."""
+        window, futures, first = self.window, self.scene.futures, self.first[row]
+        middle, half = futures.stations[row, first], futures.half_lengths[row, first]
+        rows = [BEHIND, *window.index(np.array([middle - half, middle, middle + half])).tolist()]
+        room = min(float(window.lane_left[rows].min()), -float(window.lane_right[rows].max()))
+        return 0.5 * width - room > _OFF_LANE
 
     def contacts(self, row: int) -> tuple[float, float]:
         """The first arcs at which who moves, as future `row` has it, is within its margin of the body's way, and in it.
@@ -191,11 +200,14 @@ def _let_leave(occupied: Flags, scene: Scene, gaps: Floats, config: PlanningConf
         occupied[people] &= ~(leaves & (gaps >= config.person_margin))
 
 
-def leading(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> tuple[list[int], list[int]]:
+def leading(
+    graph: Graph, lanes: frozenset[str], shape: VehicleShape, config: PlanningConfig
+) -> tuple[list[int], list[int]]:
     """Moving futures on the path, as rows of the graph: those that lead (or come towards) the ego, and the rest.
 
-    Left out are unlikely ones that are not about to happen, and who drives behind the ego, unless it passes first where
-    the path swings out, and crosses the path then. People beside it do not lead it, nor who comes by its front already.
+    `lanes` are those of the ego's route. Left out are unlikely futures that are not about to happen, and who drives
+    behind the ego, unless it passes where the path swings out, and crosses the path then: first, or on a lane of its
+    own. People beside it do not lead it, nor who comes by its front already.
     """
     scene, futures = graph.scene, graph.scene.futures
     leaders: list[int] = []
@@ -212,7 +224,7 @@ def leading(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> tuple[
             others.append(row)
         elif futures.stations[row, 0] > shape.centre:
             (leaders if entry <= PRESENT else others).append(row)
-        elif not is_in_lane:
+        elif not is_in_lane or (not lanes.issuperset(scene.lanes[row]) and graph.is_off_lane(row, shape.width)):
             others.append(row)
     return leaders, others
 

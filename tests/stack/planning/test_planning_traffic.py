@@ -58,14 +58,29 @@ def test_before_a_turn_that_swings_out_the_ego_lets_those_pass_who_come_up_in_th
     behind: float, speed: float
 ) -> None:
     """They are in its way behind it, leave that where it swings out, and come across it where it turns."""
-    curvature = np.repeat([0.0, -0.04, 0.04, 0.0, 0.18, 0.0], [60, 9, 9, 4, 17, 100])
-    route = road(bent_points(curvature))
-    is_out = (route.line.stations > 65.0) & (route.line.stations < 105.0)
-    left, right = np.where(is_out, 5.3, route.lane_left), np.where(is_out, -0.1, route.lane_right)
-    route = msgspec.structs.replace(route, lane_left=left, road_left=left, lane_right=right, road_right=right - 1.0)
-    driven = drive(route, 6.0, station=80.0, actors=[car(3, 78.0 - behind, speed=speed)])
+    driven = drive(swung_out(0.04, 5.3), 6.0, station=80.0, actors=[car(3, 78.0 - behind, speed=speed)])
     assert driven.clearances.min() > 1.0
     assert driven.speeds[-1] > 1.0  # it goes when they have passed
+
+
+@pytest.mark.parametrize(("behind", "speed"), [(14.0, 7.0), (18.0, 9.0), (22.0, 12.0), (26.0, 12.0)])
+def test_before_a_turn_that_swings_out_the_ego_lets_those_pass_whose_lane_parts_from_its_own_there(
+    behind: float, speed: float
+) -> None:
+    """It swings out less than its own width: they are in its way all the time."""
+    passing = car(3, 78.0 - behind, speed=speed, lanes=("ego_0", "beside_0"))
+    driven = drive(swung_out(0.025, 3.3), 6.0, station=78.0, speed=2.5, actors=[passing])
+    assert driven.clearances.min() > 0.2
+    assert driven.speeds[-1] > 1.0
+
+
+def swung_out(curvature: float, width: float) -> Route:
+    """A road whose line swings out to the right, of a lane so wide [m], in bends of `curvature` [1/m], to turn left."""
+    bends = np.repeat([0.0, -curvature, curvature, 0.0, 0.18, 0.0], [60, 9, 9, 4, 17, 100])
+    route = road(bent_points(bends))
+    is_out = (route.line.stations > 65.0) & (route.line.stations < 105.0)
+    left, right = np.where(is_out, width, route.lane_left), np.where(is_out, -0.1, route.lane_right)
+    return msgspec.structs.replace(route, lane_left=left, road_left=left, lane_right=right, road_right=right - 1.0)
 
 
 def test_who_comes_onto_the_junction_aslant_and_does_not_wait_is_braked_for_at_once() -> None:
