@@ -3,8 +3,9 @@
     python benchmarks/generated.py FOLDER [--nets all_way_stop,left_hand] [--egos 60] [--seed 1] [--jobs 1]
 
 Each net is built in FOLDER/NAME with its traffic (`randomTrips.py` of SUMO, turns back at dead ends included; people
-on foot where there are pavements), and screened as `dvca-sumo screen` does it, between 100 s and 1100 s. Prints a line
-for each; which violations there were and how to see them stands in FOLDER/NAME/out/screening.txt.
+on foot where there are pavements; lorries, buses and motorcycles among the cars where it is mixed), and screened as
+`dvca-sumo screen` does it, between 100 s and 1100 s. Prints a line for each; which violations there were and how to
+see them stands in FOLDER/NAME/out/screening.txt.
 """
 
 import argparse
@@ -36,17 +37,29 @@ NETS = {
     "right_on_red": (0.7, [*BLOCKS, LANES, f"{SIGNALS}_right_on_red"]),
     "stop_signs": (1.0, ["--grid", "--grid.number=5", "--grid.length=120", LANES, f"{TYPE}=priority_stop"]),
     "people": (1.5, ["--grid", "--grid.number=5", "--grid.length=150", SIGNALS, *WALKS]),
+    "mixed_random": (0.9, [*RANDOM, "--rand.random-lanenumber", "--rand.random-priority", SIGNALS, "--turn-lanes=1"]),
+    "mixed_sublane": (0.9, ["--grid", "--grid.number=5", "--grid.length=160", LANES, SIGNALS]),
 }
+MIXED = {"mixed_random", "mixed_sublane"}
+MIX = """<additional><vTypeDistribution id="mix">
+<vType id="car" vClass="passenger" probability="0.6"/><vType id="van" vClass="delivery" probability="0.15"/>
+<vType id="lorry" vClass="truck" probability="0.1"/><vType id="bus" vClass="bus" probability="0.05"/>
+<vType id="motorcycle" vClass="motorcycle" probability="0.1"/>
+</vTypeDistribution></additional>"""
+SUBLANE = {"mixed_sublane": '<processing><lateral-resolution value="0.8"/></processing>'}
 BEGIN, END = "100", "1100"  # [s]
 SCREEN = "from dvca_sumo.cli import main; main()"
 
 
 def built(folder: Path, period: float, options: list[str]) -> Path:
-    """A configuration of the net and its traffic, a trip every `period` [s]."""
+    """A configuration of the net that the folder's name stands for and its traffic, a trip every `period` [s]."""
     folder.mkdir(parents=True, exist_ok=True)
     generate = [sumolib.checkBinary("netgenerate"), *options, "--seed=5", "-o", "net.net.xml"]
     trips = [sys.executable, str(Path(sumo.SUMO_HOME, "tools", "randomTrips.py")), "-n", "net.net.xml", "-e", "1200"]
     cars = ["-o", "trips.xml", "-r", "routes.rou.xml", "-p", str(period), "--seed=7", "--validate"]
+    if folder.name in MIXED:
+        (folder / "mix.add.xml").write_text(MIX)
+        cars += ["--additional-file", "mix.add.xml", "--trip-attributes", 'type="mix" departLane="best"']
     commands = [generate, [*trips, *cars, "--fringe-factor=3", "--min-distance=300"]]
     routes = "routes.rou.xml"
     if WALKS[0] in options:
@@ -58,7 +71,7 @@ def built(folder: Path, period: float, options: list[str]) -> Path:
     config = folder / "run.sumocfg"
     config.write_text(
         f'<configuration><input><net-file value="net.net.xml"/><route-files value="{routes}"/></input>'
-        '<time><step-length value="0.1"/></time></configuration>'
+        f'<time><step-length value="0.1"/></time>{SUBLANE.get(folder.name, "")}</configuration>'
     )
     return config
 
