@@ -159,8 +159,9 @@ class Meetings:
         if told is not None:
             return told
         keeps_lane = bool(scene.lanes[row]) and self._lanes.isdisjoint(scene.lanes[row])
-        is_off_lane = graph.is_off_lane(row, self._shape.width)
-        return True if keeps_lane or is_off_lane or not self._cuts_in(row, graph) else None
+        if keeps_lane or graph.is_off_lane(row, self._shape.width):
+            return True
+        return None if self._cuts_in(row, graph) else True
 
     def _cuts_in(self, row: int, graph: Graph) -> bool:
         futures, first = graph.scene.futures, graph.first[row]
