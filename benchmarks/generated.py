@@ -13,6 +13,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import sumo
 import sumolib
@@ -23,46 +24,60 @@ SPIDER = ["--spider", "--spider.arm-number=7", "--spider.circle-number=5", "--sp
 SMALL_SPIDER = ["--spider", "--spider.arm-number=5", "--spider.circle-number=3", "--spider.space-radius=130"]
 RANDOM = ["--rand", "--rand.iterations=120"]
 BLOCKS = ["--grid", "--grid.number=4", "--grid.length=200"]
+
+
+class Net(NamedTuple):
+    """One net and its traffic."""
+
+    period: float  # [s] from one departure to the next
+    options: list[str]  # of netgenerate
+    is_mixed: bool = False
+    is_sublane: bool = False
+
+
 NETS = {
-    "all_way_stop": (1.5, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=allway_stop"]),
-    "left_hand": (1.2, ["--grid", "--grid.number=5", "--grid.length=180", "--lefthand", LANES, "--turn-lanes=1"]),
-    "right_before_left": (1.2, [*SPIDER, f"{TYPE}=right_before_left"]),
-    "right_before_left_grid": (1.2, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=right_before_left"]),
-    "right_before_left_random": (1.2, [*RANDOM, f"{TYPE}=right_before_left"]),
-    "priority_random": (0.8, [*RANDOM, LANES, f"{TYPE}=priority", "--rand.random-priority=true"]),
-    "signals": (0.8, [*RANDOM, LANES, SIGNALS]),
-    "spider_signals": (1.0, [*SMALL_SPIDER, "--spider.omit-center", LANES, SIGNALS]),
-    "three_lanes": (1.0, [*BLOCKS, "--default.lanenumber=3", "--turn-lanes=1", f"{TYPE}=traffic_light"]),
-    "turn_lanes": (0.8, [*BLOCKS, "--turn-lanes=1", "--turn-lanes.length=40", LANES, SIGNALS]),
-    "right_on_red": (0.7, [*BLOCKS, LANES, f"{SIGNALS}_right_on_red"]),
-    "stop_signs": (1.0, ["--grid", "--grid.number=5", "--grid.length=120", LANES, f"{TYPE}=priority_stop"]),
-    "people": (1.5, ["--grid", "--grid.number=5", "--grid.length=150", SIGNALS, *WALKS]),
-    "mixed_random": (0.9, [*RANDOM, "--rand.random-lanenumber", "--rand.random-priority", SIGNALS, "--turn-lanes=1"]),
-    "mixed_sublane": (0.9, ["--grid", "--grid.number=5", "--grid.length=160", LANES, SIGNALS]),
+    "all_way_stop": Net(1.5, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=allway_stop"]),
+    "left_hand": Net(1.2, ["--grid", "--grid.number=5", "--grid.length=180", "--lefthand", LANES, "--turn-lanes=1"]),
+    "right_before_left": Net(1.2, [*SPIDER, f"{TYPE}=right_before_left"]),
+    "right_before_left_grid": Net(1.2, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=right_before_left"]),
+    "right_before_left_random": Net(1.2, [*RANDOM, f"{TYPE}=right_before_left"]),
+    "priority_random": Net(0.8, [*RANDOM, LANES, f"{TYPE}=priority", "--rand.random-priority=true"]),
+    "signals": Net(0.8, [*RANDOM, LANES, SIGNALS]),
+    "spider_signals": Net(1.0, [*SMALL_SPIDER, "--spider.omit-center", LANES, SIGNALS]),
+    "three_lanes": Net(1.0, [*BLOCKS, "--default.lanenumber=3", "--turn-lanes=1", f"{TYPE}=traffic_light"]),
+    "turn_lanes": Net(0.8, [*BLOCKS, "--turn-lanes=1", "--turn-lanes.length=40", LANES, SIGNALS]),
+    "right_on_red": Net(0.7, [*BLOCKS, LANES, f"{SIGNALS}_right_on_red"]),
+    "stop_signs": Net(1.0, ["--grid", "--grid.number=5", "--grid.length=120", LANES, f"{TYPE}=priority_stop"]),
+    "people": Net(1.5, ["--grid", "--grid.number=5", "--grid.length=150", SIGNALS, *WALKS]),
+    "mixed_random": Net(
+        0.9, [*RANDOM, "--rand.random-lanenumber", "--rand.random-priority", SIGNALS, "--turn-lanes=1"], is_mixed=True
+    ),
+    "mixed_sublane": Net(
+        0.9, ["--grid", "--grid.number=5", "--grid.length=160", LANES, SIGNALS], is_mixed=True, is_sublane=True
+    ),
 }
-MIXED = {"mixed_random", "mixed_sublane"}
 MIX = """<additional><vTypeDistribution id="mix">
 <vType id="car" vClass="passenger" probability="0.6"/><vType id="van" vClass="delivery" probability="0.15"/>
 <vType id="lorry" vClass="truck" probability="0.1"/><vType id="bus" vClass="bus" probability="0.05"/>
 <vType id="motorcycle" vClass="motorcycle" probability="0.1"/>
 </vTypeDistribution></additional>"""
-SUBLANE = {"mixed_sublane": '<processing><lateral-resolution value="0.8"/></processing>'}
+SUBLANE = '<processing><lateral-resolution value="0.8"/></processing>'
 BEGIN, END = "100", "1100"  # [s]
 SCREEN = "from dvca_sumo.cli import main; main()"
 
 
-def built(folder: Path, period: float, options: list[str]) -> Path:
-    """A configuration of the net that the folder's name stands for and its traffic, a trip every `period` [s]."""
+def built(folder: Path, net: Net) -> Path:
+    """A configuration of the net and its traffic."""
     folder.mkdir(parents=True, exist_ok=True)
-    generate = [sumolib.checkBinary("netgenerate"), *options, "--seed=5", "-o", "net.net.xml"]
+    generate = [sumolib.checkBinary("netgenerate"), *net.options, "--seed=5", "-o", "net.net.xml"]
     trips = [sys.executable, str(Path(sumo.SUMO_HOME, "tools", "randomTrips.py")), "-n", "net.net.xml", "-e", "1200"]
-    cars = ["-o", "trips.xml", "-r", "routes.rou.xml", "-p", str(period), "--seed=7", "--validate"]
-    if folder.name in MIXED:
+    cars = ["-o", "trips.xml", "-r", "routes.rou.xml", "-p", str(net.period), "--seed=7", "--validate"]
+    if net.is_mixed:
         (folder / "mix.add.xml").write_text(MIX)
         cars += ["--additional-file", "mix.add.xml", "--trip-attributes", 'type="mix" departLane="best"']
     commands = [generate, [*trips, *cars, "--fringe-factor=3", "--min-distance=300"]]
     routes = "routes.rou.xml"
-    if WALKS[0] in options:
+    if WALKS[0] in net.options:
         people = ["-o", "people.xml", "-r", "people.rou.xml", "-p", "1", "--seed=8", "--pedestrians", "--prefix=p"]
         commands.append([*trips, *people, "--max-distance=600"])
         routes += ",people.rou.xml"
@@ -71,7 +86,7 @@ def built(folder: Path, period: float, options: list[str]) -> Path:
     config = folder / "run.sumocfg"
     config.write_text(
         f'<configuration><input><net-file value="net.net.xml"/><route-files value="{routes}"/></input>'
-        f'<time><step-length value="0.1"/></time>{SUBLANE.get(folder.name, "")}</configuration>'
+        f'<time><step-length value="0.1"/></time>{SUBLANE if net.is_sublane else ""}</configuration>'
     )
     return config
 
@@ -87,7 +102,7 @@ def main() -> None:
     options = parser.parse_args()
     print("net                completed  collisions  violations  travel time (median)  SUMO's driver: violations")
     for name in options.nets.split(","):
-        config = built(options.folder / name, *NETS[name])
+        config = built(options.folder / name, NETS[name])
         screen = ["screen", str(config), "--egos", options.egos, "--seed", options.seed, "--jobs", options.jobs]
         screen += ["--begin", BEGIN, "--end", END, "-o", str(config.parent / "out"), "--json"]
         run = subprocess.run([sys.executable, "-c", SCREEN, *screen], check=False, capture_output=True, text=True)  # noqa: S603
