@@ -81,12 +81,12 @@ class Tracker:
     def _absorb(self, found: Measurements, time: float) -> None:
         """Correct the tracks that were seen; start tracks of what was not known."""
         rows, matches = mutual_nearest(self._costs(found), self._config.gate)
+        if rows.size < min(self._tracks.ids.size, found.classes.size):
+            rows, matches = self._with_those_in_place(rows, matches, found)
         if rows.size:
             self._tracks.update(rows, _selected(found, matches), time)
         if matches.size < found.classes.size:
-            is_new = np.ones(found.classes.size, dtype=np.bool_)
-            is_new[matches] = False
-            self._tracks.add(_selected(found, np.flatnonzero(is_new)), time)
+            self._tracks.add(_selected(found, _others(matches, found.classes.size)), time)
 
     def _costs(self, found: Measurements) -> Floats:
         """Squared distance of each track to each measurement in units of their joint spread, (tracks, n)."""
@@ -97,6 +97,23 @@ class Tracker:
         differs = tracks.classes[:, None] != found.classes
         costs: Floats = (dx * dx + dy * dy) / (own[:, None] + found.variances) + self._config.class_penalty * differs
         return costs
+
+    def _with_those_in_place(self, rows: Integers, matches: Integers, found: Measurements) -> tuple[Integers, Integers]:
+        """The pairs, and of the rest those in which a track's place is within half the width of what was found.
+
+        Two bodies cannot be in one place: it has moved as it is not expected to, and would go on as two.
+        """
+        tracks = self._tracks
+        lost, new = _others(rows, tracks.ids.size), _others(matches, found.classes.size)
+        dx = tracks.means[lost, 0, None] - found.boxes[new, 0]
+        dy = tracks.means[lost, 1, None] - found.boxes[new, 1]
+        half_widths = 0.5 * found.boxes[new, 4]
+        again, seen = mutual_nearest((dx * dx + dy * dy) / (half_widths * half_widths), 1.0)
+        if not again.size:
+            return rows, matches
+        rows, matches = np.concatenate((rows, lost[again])), np.concatenate((matches, new[seen]))
+        order = rows.argsort()
+        return rows[order], matches[order]
 
     def _live_and_die(self, time: float) -> Flags:
         """Drop what was lost or never confirmed; of the rest, which are confirmed."""
@@ -158,6 +175,13 @@ def mutual_nearest(costs: Floats, gate: float) -> tuple[Integers, Integers]:
             return matched, matches[matched]
         costs[is_mutual] = np.inf
         costs[:, cheapest[is_mutual]] = np.inf
+
+
+def _others(rows: Integers, count: int) -> Integers:
+    """Which of `count` rows are not among `rows`."""
+    is_other = np.ones(count, dtype=np.bool_)
+    is_other[rows] = False
+    return is_other.nonzero()[0]
 
 
 def _selected(found: Measurements, rows: Integers) -> Measurements:

@@ -104,6 +104,13 @@ def test_an_object_that_comes_back_in_time_keeps_its_id_and_later_gets_a_new_one
     assert too_late[-1].ids.tolist() == [2]
 
 
+def test_a_car_that_slides_farther_than_any_car_is_taken_to_does_not_become_two() -> None:
+    scenes = [[car(20, 0.06 * k)] for k in range(30)]
+    messages = tracked(scenes)
+    assert ids(messages[1:]) == [[1]] * 29
+    assert messages[-1].boxes[0, 1] == pytest.approx(0.06 * 29, abs=0.9)
+
+
 def test_pedestrians_who_cross_each_others_way_keep_their_ids() -> None:
     scenes = [[walker(15, -3 + 0.14 * k, 0, 1.4), walker(15.6, 3 - 0.14 * k, 0, -1.4)] for k in range(43)]
     messages = tracked(scenes)
