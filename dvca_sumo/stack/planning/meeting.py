@@ -134,14 +134,14 @@ class Meetings:
     def _passes(self, rows: list[int], graph: Graph, profile: Profile, margin: float) -> Flags:
         """Whether the ego has left every place that a future occupies `margin` [s] before it comes there."""
         rear = np.interp(graph.scene.times - margin, STEP_TIMES, profile.arcs) - self._shape.rear_overhang
-        passes: Flags = np.all((rear > graph.high[rows]) | ~graph.occupied[rows], axis=1)
+        passes: Flags = np.all((rear > graph.ends[rows]) | ~graph.occupied[rows], axis=1)
         return passes
 
     def _comes_after(self, rows: list[int], graph: Graph, profile: Profile) -> Flags:
         """Whether the ego comes to every place that a future occupies after that has gone."""
         times = graph.scene.times + self._config.clear_margin
         front = np.interp(times, STEP_TIMES, profile.arcs) + (self._shape.front + _CLEAR_GAP)
-        after: Flags = np.all((front < graph.low[rows]) | ~graph.occupied[rows], axis=1)
+        after: Flags = np.all((front < graph.begins[rows]) | ~graph.occupied[rows], axis=1)
         return after
 
     def _others_first(self, row: int, graph: Graph, views: list[LineView]) -> bool | None:

@@ -37,6 +37,8 @@ class Graph(msgspec.Struct, frozen=True, eq=False):
     gaps: Floats  # (h, t) [m] sideways between body and object, negative where they would overlap
     low: Floats  # (h, t) [m] the object's near end along the path
     high: Floats  # (h, t) [m] its far end
+    begins: Floats  # (h, t) [m] as `low`, but of that part of its outline which is in the way, where it grazes that
+    ends: Floats  # (h, t) [m] as `high`, but of the same
     first: list[int]  # (h,) column in which occupation begins; 0 where there is none
     last: list[int]  # (h,) column in which it ends
     rear_overhang: float  # [m] of the ego
@@ -99,14 +101,19 @@ def graph_of(
     for overpass in route.overpasses:
         _pass_over(occupied, overpass, scene, window)
     grazing = (occupied[: scene.moving] & (gaps[: scene.moving] > -_GRAZING)).nonzero()
+    begins, ends = low, high
     if grazing[0].size:
-        gaps[grazing] = _beside(scene, window, path, *grazing)
-        occupied[grazing] = gaps[grazing] < margins[grazing[0]]
+        begins, ends = low.copy(), high.copy()
+        nearest, begins[grazing], ends[grazing] = _beside(scene, window, path, margins[grazing[0]], *grazing)
+        gaps[grazing] = nearest
+        occupied[grazing] = nearest < margins[grazing[0]]
     if config.trusts_lane_room:
         occupied[scene.moving :][_has_lane_room(scene, window, shape)] = False
     last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)
     first = occupied.argmax(axis=1).tolist()
-    return Graph(window, path, scene, occupied, margins, gaps, low, high, first, last.tolist(), shape.rear_overhang)
+    return Graph(
+        window, path, scene, occupied, margins, gaps, low, high, begins, ends, first, last.tolist(), shape.rear_overhang
+    )
 
 
 def _look_closely(gaps: Floats, scene: Scene, window: Window, path: Path) -> None:
@@ -118,13 +125,22 @@ def _look_closely(gaps: Floats, scene: Scene, window: Window, path: Path) -> Non
     gaps[doubtful] = beside.reshape(len(doubtful), -1).min(axis=1)[:, None]
 
 
-def _beside(scene: Scene, window: Window, path: Path, rows: Integers, columns: Integers) -> Floats:
-    """Gaps (n,) [m] sideways to those who move, at moments of futures: in a bend they pass closer by their extents."""
+def _beside(
+    scene: Scene, window: Window, path: Path, margins: Floats, rows: Integers, columns: Integers
+) -> tuple[Floats, Floats, Floats]:
+    """Those who move, at moments of futures (n,), by their outlines: extents are more, in a bend and of who is aslant.
+
+    Returns:
+        Gaps sideways; the arcs from which, and up to which, they are nearer than `margins` (n,). All (n,) [m].
+    """
     boxes = scene.boxes[scene.owners[rows]]
     boxes[:, :3] = scene.poses[rows, columns]
-    _, gaps = _closely(boxes, window, path)
-    nearest: Floats = gaps.reshape(len(rows), -1).min(axis=1)
-    return nearest
+    stations, gaps = (points.reshape(len(rows), -1) for points in _closely(boxes, window, path))
+    is_near = gaps < margins[:, None]
+    begins, ends = np.where(is_near, stations, np.inf).min(axis=1), np.where(is_near, stations, -np.inf).max(axis=1)
+    metres = np.arange(-BEHIND, len(path.arcs), dtype=np.float64)
+    arcs = np.concatenate((metres[:BEHIND], path.arcs))
+    return gaps.min(axis=1), np.interp(begins, metres, arcs), np.interp(ends, metres, arcs)
 
 
 def _closely(boxes: Floats, window: Window, path: Path) -> tuple[Floats, Floats]:

@@ -582,6 +582,20 @@ def test_who_should_have_waited_is_stopped_for_before_its_way_not_at_the_line() 
     assert driven.clearances.min() > 0.5
 
 
+@pytest.mark.parametrize(
+    ("x", "y", "aslant", "speed"), [(108.0, 5.4, 0.5, 1.0), (108.0, 5.4, 0.5, 1.5), (112.0, 4.6, 0.3, 2.0)]
+)
+def test_before_who_comes_aslant_the_ego_passes_where_only_a_corner_would_come_into_its_way(
+    x: float, y: float, aslant: float, speed: float
+) -> None:
+    """The rest of that lorry reaches much farther along the ego's way, beside it."""
+    lorry = car(3, x, y, heading=math.pi + aslant, speed=speed, size=(7.1, 2.4), lanes=("major_0",))
+    route = road(stop_lines=[stop_line(80.0, Control.PRIORITY, exit_station=120.0)])
+    driven = drive(route, 4.0, speed=7.0, station=90.0, actors=[lorry])
+    assert driven.states[:, 5].min() > -0.5
+    assert driven.clearances.min() > 0.3
+
+
 def test_car_that_should_wait_but_cannot_any_more_is_yielded_to() -> None:
     driven = drive(
         road(stop_lines=[stop_line(100.0, Control.PRIORITY, yields_to=frozenset())]),
