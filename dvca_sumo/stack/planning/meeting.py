@@ -78,7 +78,8 @@ class Meetings:
         if room <= -HARD_GAP - self._beside(row, entry, graph, profile):  # stopping there would not help
             return None
         is_too_late = profile.speeds[0] ** 2 / (2.0 * max(room, _LEAST_ROOM)) > config.hard_braking
-        if is_too_late and self._passes([row], graph, profile, 0.0)[0]:
+        gives_way = not others_first and self._may_stop(row, entry, graph)  # the sooner the ego is gone, the better
+        if is_too_late and (gives_way or self._passes([row], graph, profile, 0.0)[0]):
             return None
         return Demand(row, stop, follows=self._joins(row, graph))
 
@@ -117,14 +118,19 @@ class Meetings:
         rear = np.interp(graph.scene.times[near], STEP_TIMES, profile.arcs) - self._shape.rear_overhang
         return bool((rear <= graph.high[row, near]).any())
 
-    def _will_wait(self, row: int, entry: float, graph: Graph) -> bool:
-        """Whether who has to give way, and is on the path at `entry` [s], may still stop: unless it speeds up."""
+    def _may_stop(self, row: int, entry: float, graph: Graph) -> bool:
+        """Whether who is on the path at `entry` [s] may still stop before."""
         config, scene = self._config, graph.scene
         speed = float(scene.speeds[scene.owners[row]])
         left = entry - config.expected_reaction
-        if entry <= PRESENT or speed > 2.0 * max(left, 0.0) * config.expected_braking:
+        return entry > PRESENT and speed <= 2.0 * max(left, 0.0) * config.expected_braking
+
+    def _will_wait(self, row: int, entry: float, graph: Graph) -> bool:
+        """Whether who has to give way, and is on the path at `entry` [s], may still stop: unless it speeds up."""
+        if not self._may_stop(row, entry, graph):
             return False
-        futures = scene.futures
+        futures = graph.scene.futures
+        speed = float(graph.scene.speeds[graph.scene.owners[row]])
         way = math.hypot(
             float(futures.stations[row, SOON] - futures.stations[row, 0]),
             float(futures.offsets[row, SOON] - futures.offsets[row, 0]),

@@ -596,6 +596,21 @@ def test_before_who_comes_aslant_the_ego_passes_where_only_a_corner_would_come_i
     assert driven.clearances.min() > 0.3
 
 
+@pytest.mark.parametrize(("speed", "decision"), [(1.0, "cruise"), (3.0, "cruise"), (8.0, "yield 3")])
+def test_ego_that_could_only_stop_in_the_way_of_who_should_wait_goes_on_while_that_one_still_can(
+    speed: float, decision: str
+) -> None:
+    """The lorry gets faster, and would be in the ego's way after a second."""
+    ways = speed * PREDICTION_TIMES + 0.5 * PREDICTION_TIMES**2
+    y = 4.75 + float(np.interp(1.0, PREDICTION_TIMES, ways))
+    places = np.column_stack((np.full(len(ways), 20.0), y - ways, np.full(len(ways), DOWN)))
+    starting = car(3, 20.0, y, heading=DOWN, speed=speed, size=(7.1, 2.4), lanes=("minor_0",))
+    future = msgspec.structs.replace(predicted([starting], 0.0), poses=places[None])
+    line = stop_line(12.0, Control.PRIORITY, yields_to=frozenset(), exit_station=40.0)
+    planner = Planner(PlanningConfig(), road(stop_lines=[line]), SHAPE)
+    assert planner.step(believed(14.0, speed=4.0), future, {}).decision == decision
+
+
 def test_car_that_should_wait_but_cannot_any_more_is_yielded_to() -> None:
     driven = drive(
         road(stop_lines=[stop_line(100.0, Control.PRIORITY, yields_to=frozenset())]),
