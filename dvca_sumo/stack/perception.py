@@ -109,11 +109,7 @@ class Tracker:
         dy = tracks.means[lost, 1, None] - found.boxes[new, 1]
         half_widths = 0.5 * found.boxes[new, 4]
         again, seen = mutual_nearest((dx * dx + dy * dy) / (half_widths * half_widths), 1.0)
-        if not again.size:
-            return rows, matches
-        rows, matches = np.concatenate((rows, lost[again])), np.concatenate((matches, new[seen]))
-        order = rows.argsort()
-        return rows[order], matches[order]
+        return np.concatenate((rows, lost[again])), np.concatenate((matches, new[seen]))
 
     def _live_and_die(self, time: float) -> Flags:
         """Drop what was lost or never confirmed; of the rest, which are confirmed."""
