@@ -78,8 +78,10 @@ class Meetings:
         if room <= -HARD_GAP - self._beside(row, entry, graph, profile):  # stopping there would not help
             return None
         is_too_late = profile.speeds[0] ** 2 / (2.0 * max(room, _LEAST_ROOM)) > config.hard_braking
-        gives_way = not others_first and self._may_stop(row, entry, graph)  # the sooner the ego is gone, the better
-        if is_too_late and (gives_way or self._passes([row], graph, profile, 0.0)[0]):
+        if is_too_late and (
+            (not others_first and self._may_stop(row, entry, graph))  # the sooner the ego is gone, the better
+            or self._passes([row], graph, profile, 0.0)[0]
+        ):
             return None
         return Demand(row, stop, follows=self._joins(row, graph))
 
