@@ -18,7 +18,8 @@ PARALLEL = 0.95  # cosine of the smallest angle (18 degrees) to the line at whic
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
 _SEEN_LATE = 20.0  # [m] before the end of the window, objects are not yet decided about
-_DOUBT = 1.0  # [m] that extents of who stands aslant, or beside a bend, may be less than it is
+_DOUBT = 1.0  # [m] that extents may be less than the body, at most: beside a bend
+_LEAST_DOUBT = 0.1  # [m] and on a straight line
 _PARTS = 4  # of each side of an outline
 
 
@@ -84,21 +85,21 @@ def blockers(
     walks = _walks_along(scene)
     if not (walks | scene.is_standing).any() and not held:
         return [], _NOBODY
-    now = scene.now
     wanted = np.where(scene.classes == _PERSON, config.person_clearance, config.nudge_clearance)
-    is_held = np.array([track in held for track in scene.ids], dtype=np.bool_)
-    speeds = np.where(scene.is_standing | walks, 0.0, scene.speeds)  # all the way of who walks is taken
-    closing = np.maximum(speed - speeds, 0.0)
-    way = closing * closing / (2.0 * config.comfort_braking) + LENGTHWISE
-    is_beside = is_held & (now.stations - now.half_lengths < shape.front + way)
-    limits = wanted + config.nudge_hold * is_held
-    near = (scene.is_standing | is_beside | walks) & _may_be_passed_closer(limits, scene, window, shape)
+    limits, passed = wanted, scene.is_standing | walks
+    speeds = np.where(passed, 0.0, scene.speeds)  # all the way of who walks is taken
+    if held:
+        is_held = np.array([track in held for track in scene.ids], dtype=np.bool_)
+        limits = wanted + config.nudge_hold * is_held
+        passed |= is_held & _is_too_near(speeds, speed, scene, shape, config)
+    near = passed & _may_be_passed_closer(limits, scene, window, shape)
     if not near.any():
         return [], _NOBODY
     beside = _beside(scene, window, near | scene.is_standing)
     near &= beside.clearances(0.0) < limits
     if not near.any():
         return [], _NOBODY
+    now = scene.now
     met = _met(now.stations, np.where(walks, scene.speeds * now.directions, 0.0), speed, config.acceleration)
     lows = np.minimum(now.stations, met) - now.half_lengths
     highs = met + now.half_lengths
@@ -122,11 +123,22 @@ def blockers(
     return sorted(found, key=lambda blocker: blocker.low), beside.of(scene.is_standing)
 
 
+def _is_too_near(speeds: Floats, speed: float, scene: Scene, shape: VehicleShape, config: PlanningConfig) -> Flags:
+    """Which objects (n,) at `speeds` an ego at `speed` [m/s] is beside, or cannot fall in behind in comfort."""
+    closing = np.maximum(speed - speeds, 0.0)
+    way = closing * closing / (2.0 * config.comfort_braking) + LENGTHWISE
+    near: Flags = scene.now.stations - scene.now.half_lengths < shape.front + way
+    return near
+
+
 def _may_be_passed_closer(limits: Floats, scene: Scene, window: Window, shape: VehicleShape) -> Flags:
     """Which objects (n,) on the way ahead, going by their extents, may be closer than `limits` (n,) [m]."""
     now, rows = scene.now, scene.now.rows(window)
     swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
-    near: Flags = now.gaps(swept_left, swept_right) < limits + _DOUBT
+    # Over its half length the line bends away from a body, over the ego's length the swept edge away from the line.
+    bend = 0.5 * float(np.abs(window.curvatures).max())
+    doubt = bend * (now.half_lengths * now.half_lengths + shape.length * shape.length) + _LEAST_DOUBT
+    near: Flags = now.gaps(swept_left, swept_right) < limits + np.minimum(doubt, _DOUBT)
     near &= now.stations + now.half_lengths > -shape.rear_overhang - LENGTHWISE
     near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
     return near

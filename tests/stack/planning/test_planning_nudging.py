@@ -26,6 +26,7 @@ from dvca_sumo.geometry.boxes import box_of, distances, outlines
 from dvca_sumo.messages import Floats, ObjectClass
 from dvca_sumo.roadmap.route import Control
 from dvca_sumo.stack.planning import PlanningConfig
+from dvca_sumo.stack.planning.blockers import blockers
 from dvca_sumo.stack.planning.moves import Lateral
 from dvca_sumo.stack.planning.nudging import NudgeDecider
 from dvca_sumo.stack.planning.reference import Reference
@@ -665,3 +666,25 @@ def test_beside_who_leaves_less_room_than_it_seemed_the_ego_does_not_turn_back_t
     assert beside[49]
     assert driven.states[beside, 2].min() > 0.45
     assert driven.clearances.min() > 0.2
+
+
+@pytest.mark.parametrize("radius", [12.0, 30.0, 80.0, 300.0])
+@pytest.mark.parametrize("size", [(0.4, 0.4), (4.5, 1.8), (12.0, 2.5)])
+def test_nobody_beside_a_bend_is_taken_to_stand_clear_who_does_not(radius: float, size: tuple[float, float]) -> None:
+    """Who may be near is looked for by extents first: their outlines tell, wherever they stand, and however."""
+    route, config, random = road(curve_points(radius)), PlanningConfig(), np.random.default_rng(1)
+    window = Reference(route, SHAPE, config).window(85.0, 80.0)
+    stations, besides = random.uniform(90.0, 130.0, 200), random.uniform(1.0, 4.0, 200) * random.choice([-1, 1], 200)
+    x, y, along = route.line.poses(stations).T
+    headings = along + random.normal(0.0, 0.4, 200)
+    spots = zip(x - besides * np.sin(along), y + besides * np.cos(along), headings, strict=True)
+    actors = [car(track, east, north, heading=turned, size=size) for track, (east, north, turned) in enumerate(spots)]
+    scene = scene_in(window, predicted(actors, 0.0), 0.0, (), config)
+    found, _ = blockers(scene, window, 5.0, (), SHAPE, config)
+    around, offsets, _ = window.project(outlines(scene.boxes, 4).reshape(-1, 2))
+    rows = window.index(around)
+    right = (offsets - window.swept_left[rows]).reshape(200, -1).min(axis=1)
+    left = (offsets - window.swept_right[rows]).reshape(200, -1).max(axis=1)
+    near = np.maximum(right, -left) < config.nudge_clearance
+    assert 5 < np.count_nonzero(near) < 195
+    assert {blocker.track for blocker in found} == set(near.nonzero()[0].tolist())
