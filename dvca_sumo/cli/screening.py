@@ -78,7 +78,7 @@ def screen(
     output: Path | None,
     as_json: bool,  # noqa: FBT001
 ) -> None:
-    r"""Drive trips of a scenario's own traffic with the ADS, and the same trips with SUMO's drivers.
+    """Drive trips of a scenario's own traffic with the ADS, and the same trips with SUMO's drivers.
 
     A trip is drivable when its vehicle is a car, its route is 300 m or longer and can be driven, and SUMO's own driver
     is over it before the end, and well before an ego's patience is; stops on the way are made by nobody who drives it.
@@ -88,7 +88,7 @@ def screen(
     \b
     Exit codes: 0 nothing violated by the ADS's own doing; 1 something was; 2 usage; 3 bad input;
     4 nothing was, but trips could not be driven; 70 internal error; 130 interrupted.
-    """
+    """  # noqa: D301 - click wants the very character, not its escape
     if output is not None:
         make_folder(output)
     load_scenario(sumocfg, AUTO, seed, begin, end)  # refuses an end that is none

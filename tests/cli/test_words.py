@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from command_line import Said, assert_one_error
 
-from dvca_sumo.cli import ExitCode
+from dvca_sumo.cli import ExitCode, program
 from dvca_sumo.interventions import fault_library
 from dvca_sumo.stack.bugs import BUGS
 
@@ -100,6 +100,11 @@ def test_help_explains(called: Called, line: str, explained: tuple[str, ...]) ->
     assert said.err == ""
     unwrapped = " ".join(said.out.split())
     assert [word for word in explained if word not in unwrapped] == []
+
+
+@pytest.mark.parametrize("command", sorted(program.commands))
+def test_help_shows_no_marks_of_its_layout(called: Called, command: str) -> None:
+    assert "\\" not in called(command, "--help").out
 
 
 def test_faults_lists_all_thirteen_with_component_parameters_and_units(called: Called) -> None:
