@@ -133,7 +133,7 @@ def _is_too_near(speeds: Floats, speed: float, scene: Scene, shape: VehicleShape
 
 def _may_be_passed_closer(limits: Floats, scene: Scene, window: Window, shape: VehicleShape) -> Flags:
     """Which objects (n,) on the way ahead, going by their extents, may be closer than `limits` (n,) [m]."""
-    now, rows = scene.now, scene.now.rows(window)
+    now, rows = scene.now, scene.rows_now
     swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
     # Over its half length the line bends away from a body, over the ego's length the swept edge away from the line.
     bend = 0.5 * float(np.abs(window.curvatures).max())

@@ -17,7 +17,7 @@ IN_LANE = 1.2  # [m] vehicles whose middle is this near the middle of a lane are
 ALONG = 0.5  # cosine of the largest angle (60 degrees) to a lane or path at which someone drives along it, not across
 SOON = int(np.searchsorted(PREDICTION_TIMES, 1.0))  # far enough to tell going from staying, too near for a guess
 SOON_TIME = float(PREDICTION_TIMES[SOON])  # [s]
-_ENDS = np.array([0.0, -1.0, 1.0])  # middle, near and far end, in half lengths
+_ENDS = np.array([[0.0], [-1.0], [1.0]])  # middle, near and far end, in half lengths
 _SPARSE = 4  # every so many times of a hypothesis do to bound it
 _FEW = 8  # hypotheses are placed in less time than it takes to find out which are far away
 _AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
@@ -32,14 +32,6 @@ class Extents(msgspec.Struct, frozen=True, eq=False):
     half_widths: Floats  # [m] across it
     directions: Floats  # cosine of the angle between box and reference line
 
-    def rows(self, window: Window) -> Integers:
-        """(3, ...) rows of the window under their middles, near and far ends.
-
-        A body may pass a middle with room to spare and yet sweep over an end.
-        """
-        ends = _ENDS.reshape(3, *(1,) * self.stations.ndim)
-        return window.index(self.stations + ends * self.half_lengths)
-
     def gaps(self, left: Floats, right: Floats) -> Floats:
         """Sideways to a body from offset `right` to `left` beside each; negative where they would overlap [m]."""
         gaps: Floats = np.maximum(self.offsets - left, right - self.offsets) - self.half_widths
@@ -47,7 +39,11 @@ class Extents(msgspec.Struct, frozen=True, eq=False):
 
 
 class Scene(msgspec.Struct, frozen=True, eq=False):
-    """Objects now, and futures of each: its likely hypotheses, or staying where it is."""
+    """Objects now, and futures of each: its likely hypotheses, or staying where it is.
+
+    Rows of the window are those under their middles, near and far ends: a body may pass a middle with room to spare,
+    and yet sweep over an end.
+    """
 
     ids: list[int]  # (n,)
     classes: Integers  # (n,)
@@ -55,12 +51,14 @@ class Scene(msgspec.Struct, frozen=True, eq=False):
     speeds: Floats  # (n,) [m/s]
     is_standing: Flags  # (n,) not predicted to go anywhere
     now: Extents  # (n,)
+    rows_now: Integers  # (3, n) of the window
     times: Floats  # (t,) [s] from the present
     owners: Integers  # (h,) row of the object
     is_person: Flags  # (h,) whether that is one
     probabilities: Floats  # (h,)
     lanes: list[tuple[str, ...]]  # (h,) followed; the one it is on of who stays
     futures: Extents  # (h, t)
+    rows: Integers  # (3, h, t) of the window
     moving: int  # the first `moving` futures move, the others stay where they are
     poses: Floats  # (moving, t, 3) [m], [m], [rad] of the box centres
 
@@ -91,7 +89,7 @@ def scene_in(
         rows, poses = rows[around], poses[around]
     owners = predicted.owners[rows]
     on = dict(zip(predicted.owners.tolist(), predicted.lanes, strict=True))
-    now, futures = _extents(window, objects.boxes, poses, owners, still)
+    now, futures, rows_now, rows_then = _extents(window, objects.boxes, poses, owners, still)
     owners = np.concatenate((owners, still))
     return Scene(
         ids=ids,
@@ -100,12 +98,14 @@ def scene_in(
         speeds=speeds,
         is_standing=standing,
         now=now,
+        rows_now=rows_now,
         times=PREDICTION_TIMES - (time - predicted.time),
         owners=owners,
         is_person=is_person[owners],
         probabilities=np.concatenate((predicted.probabilities[rows], np.ones(len(still)))),
         lanes=[predicted.lanes[row] for row in rows.tolist()] + [on.get(row, ()) for row in still.tolist()],
         futures=futures,
+        rows=rows_then,
         moving=len(rows),
         poses=poses,
     )
@@ -148,18 +148,25 @@ def extents(window: Window, boxes: Floats, poses: Floats, owners: Integers) -> E
 
 def _extents(
     window: Window, boxes: Floats, poses: Floats, owners: Integers, still: Integers
-) -> tuple[Extents, Extents]:
-    """Of boxes (n, 5) now; and of their futures: hypotheses (h, t, 3), then one for each of `still` that stays."""
+) -> tuple[Extents, Extents, Integers, Integers]:
+    """Of boxes (n, 5) now; and of their futures: hypotheses (h, t, 3), then one for each of `still` that stays.
+
+    With them the rows of the window under both, as in `Scene`.
+    """
     count, (moving, times, _) = len(boxes), poses.shape
     flat = np.concatenate((boxes[:, :3], poses.reshape(-1, 3)))
     halves = 0.5 * boxes[:, 3:].T
     halves = np.concatenate((halves, halves.take(owners, axis=1).repeat(times, axis=1)), axis=1)
     placed = _placed(window, flat, halves)
-    now = placed[:, :count]
+    rows = window.index(placed[0] + _ENDS * placed[2])
+    now, rows_now = placed[:, :count], rows[:, :count]
     futures = np.empty((5, moving + len(still), times))
     futures[:, :moving] = placed[:, count:].reshape(5, moving, times)
     futures[:, moving:] = now.take(still, axis=1)[:, :, None]
-    return Extents(*now), Extents(*futures)
+    rows_then = np.empty((3, moving + len(still), times), dtype=np.int64)
+    rows_then[:, :moving] = rows[:, count:].reshape(3, moving, times)
+    rows_then[:, moving:] = rows_now.take(still, axis=1)[:, :, None]
+    return Extents(*now), Extents(*futures), rows_now, rows_then
 
 
 def _placed(window: Window, poses: Floats, halves: Floats) -> Floats:

@@ -85,8 +85,7 @@ def graph_of(
 
     `speed` is the ego's [m/s].
     """
-    futures = scene.futures
-    rows = futures.rows(window)
+    futures, rows = scene.futures, scene.rows
     gaps = futures.gaps(np.maximum.reduce(path.left.take(rows)), np.minimum.reduce(path.right.take(rows)))
     _look_closely(gaps[scene.moving :], scene, window, path)
     count = len(path.arcs)
@@ -166,7 +165,7 @@ def _has_lane_room(scene: Scene, window: Window, shape: VehicleShape) -> Flags:
     """
     futures, still = scene.futures, slice(scene.moving, None)
     offsets, half_widths = futures.offsets[still, 0], futures.half_widths[still, 0]
-    rows = futures.rows(window)[:, still, 0]
+    rows = scene.rows[:, still, 0]
     lane_left, lane_right = window.lane_left[rows].min(axis=0), window.lane_right[rows].max(axis=0)
     left, right = offsets + half_widths, offsets - half_widths
     is_on_line = (left > 0.0) & (right < 0.0)
