@@ -1,4 +1,4 @@
-"""How the reference ADS drives networks that nobody drew: those of netgenerate, with random trips.
+"""How the reference ADS drives networks that nobody drew: those of netgenerate, and roundabouts, with random trips.
 
     python benchmarks/generated.py FOLDER [--nets all_way_stop,left_hand] [--egos 60] [--seed 1] [--jobs 1]
 
@@ -15,6 +15,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+import roundabouts
 import sumo
 import sumolib
 
@@ -33,6 +34,7 @@ class Net(NamedTuple):
     options: list[str]  # of netgenerate
     is_mixed: bool = False
     is_sublane: bool = False
+    round_lanes: int = 0  # of roundabouts; 0: none
 
 
 NETS = {
@@ -55,6 +57,8 @@ NETS = {
     "mixed_sublane": Net(
         0.9, ["--grid", "--grid.number=5", "--grid.length=160", LANES, SIGNALS], is_mixed=True, is_sublane=True
     ),
+    "roundabouts": Net(1.2, [], round_lanes=1),
+    "wide_roundabouts": Net(0.8, [], round_lanes=2),
 }
 MIX = """<additional><vTypeDistribution id="mix">
 <vType id="car" vClass="passenger" probability="0.6"/><vType id="van" vClass="delivery" probability="0.15"/>
@@ -69,7 +73,10 @@ SCREEN = "from dvca_sumo.cli import main; main()"
 def built(folder: Path, net: Net) -> Path:
     """A configuration of the net and its traffic."""
     folder.mkdir(parents=True, exist_ok=True)
-    generate = [sumolib.checkBinary("netgenerate"), *net.options, "--seed=5", "-o", "net.net.xml"]
+    program, options = "netgenerate", [*net.options, "--seed=5"]
+    if net.round_lanes:
+        program, options = "netconvert", roundabouts.written(folder, net.round_lanes)
+    generate = [sumolib.checkBinary(program), *options, "-o", "net.net.xml"]
     trips = [sys.executable, str(Path(sumo.SUMO_HOME, "tools", "randomTrips.py")), "-n", "net.net.xml", "-e", "1200"]
     cars = ["-o", "trips.xml", "-r", "routes.rou.xml", "-p", str(net.period), "--seed=7", "--validate"]
     if net.is_mixed:
