@@ -156,19 +156,21 @@ class LaneFollowing:
         shared = self._shared(candidates, misfit, len(movers.tracks))
         lost = sorted(set(owners).difference(shared.owners.tolist()))
         self._advance(shared, movers.tracks)
-        return shared._replace(owners=movers.rows[shared.owners]), lost
+        rows = movers.rows[shared.owners]
+        return Candidates(rows, shared.paths, shared.probabilities, shared.placements), lost
 
     def _shared(self, candidates: Candidates, misfit: Floats, count: int) -> Candidates:
         """Priors times Gaussian likelihood, as probabilities; what does not fit or is unlikely is dropped."""
         owners, priors = candidates.owners, candidates.probabilities
         misfit = np.where(priors > 0.0, misfit, _NO_FIT)
-        best = np.full(count, _NO_FIT)
+        best = np.empty(count)
+        best.fill(_NO_FIT)
         np.minimum.at(best, owners, misfit)
         weights = priors * np.exp(-0.5 * (misfit - best[owners]))
         weights /= np.maximum(np.bincount(owners, weights, count), 1e-12)[owners]
         weights[weights < self._config.min_share] = 0.0
         weights /= np.maximum(np.bincount(owners, weights, count), 1e-12)[owners]
-        shared, kept = candidates._replace(probabilities=weights), weights.nonzero()[0]
+        shared, kept = Candidates(owners, candidates.paths, weights, candidates.placements), weights.nonzero()[0]
         return shared if len(kept) == len(weights) else shared.chosen(kept)
 
     def _advance(self, candidates: Candidates, tracks: Sequence[int]) -> None:

@@ -97,11 +97,12 @@ def way_back(
     state: Lateral, begin: float, speed: float, window: Window, shape: VehicleShape, config: PlanningConfig
 ) -> Move:
     """The move back to the line, from station `begin` [m]: in comfort, if tyres, steering and the front allow it."""
-    move = Move(state, 0.0, begin, blend_length(state.unsettled, speed, config))
-    move = move._replace(length=feasible_length(move, speed, window, config))
-    if state.unsettled > _AT_REST:
+    unsettled = state.unsettled
+    comfortable = Move(state, 0.0, begin, blend_length(unsettled, speed, config))
+    move = Move(state, 0.0, begin, feasible_length(comfortable, speed, window, config))
+    if unsettled > _AT_REST:
         roomy = roomy_length(move, window, shape)
-        return move if roomy == math.inf else move._replace(length=roomy)
+        return move if roomy == math.inf else Move(state, 0.0, begin, roomy)
     return move
 
 
