@@ -1,7 +1,8 @@
 """Which lanes moving objects follow: found by distance and heading, then kept from cycle to cycle.
 
 An object is anchored to a lane off the junctions and seen from every continuation of it. Thus lanes that
-overlap on a junction compete by how well they fit, and no object hops between them.
+overlap on a junction compete by how well they fit, and no object hops between them. One that is first seen
+on a junction is anchored to all the lanes there that it fits, until it leaves it.
 """
 
 import math
@@ -71,13 +72,14 @@ class Movers(NamedTuple):
 
 
 class _Anchor:
-    """What is remembered of one object; `lane` is None off the road."""
+    """What is remembered of one object."""
 
-    __slots__ = ("lane", "station", "x", "y")
+    __slots__ = ("places", "x", "y")
 
     def __init__(self) -> None:
-        self.lane: str | None = None
-        self.station = 0.0  # [m] from the start of `lane`, may lie beyond its end on a junction
+        # Lanes, and stations from their starts [m], which may lie beyond their ends on a junction: likeliest first, and
+        # more than one only of who was found on a junction; none off the road.
+        self.places: list[tuple[str, float]] = []
         self.x = self.y = math.inf  # [m] where lanes were last looked for
 
 
@@ -94,7 +96,7 @@ class LaneFollowing:
     def lanes_of(self, track: int) -> tuple[str, ...]:
         """The lane the object was last anchored to, alone; empty off the road."""
         anchor = self._anchors.get(track)
-        return () if anchor is None or anchor.lane is None else (anchor.lane,)
+        return () if anchor is None or not anchor.places else (anchor.places[0][0],)
 
     def forget_all_but(self, tracks: Iterable[int]) -> None:
         """Drops what is remembered of objects that are not in `tracks`."""
@@ -107,7 +109,7 @@ class LaneFollowing:
             anchor = self._anchors.get(track)
             if anchor is None:
                 anchor = self._anchors[track] = _Anchor()
-            if anchor.lane is None and math.hypot(x - anchor.x, y - anchor.y) >= self._config.retry_distance:
+            if not anchor.places and math.hypot(x - anchor.x, y - anchor.y) >= self._config.retry_distance:
                 anchor.x, anchor.y = x, y
                 wanted.append(row)
         if not wanted:
@@ -134,14 +136,13 @@ class LaneFollowing:
         moved, reaches = movers.moved.tolist(), movers.reaches.tolist()
         for i, (track, step, reach) in enumerate(zip(movers.tracks, moved, reaches, strict=True)):
             anchor = self._anchors[track]
-            if anchor.lane is None:
-                continue
-            anchor.station += step
-            for path, probability in self._paths.branches(anchor.lane, anchor.station + reach):
-                owners.append(i)
-                paths.append(path)
-                priors.append(probability)
-                guesses.append(anchor.station)
+            anchor.places = [(lane, station + step) for lane, station in anchor.places]
+            for lane, station in anchor.places:
+                for path, probability in self._paths.branches(lane, station + reach):
+                    owners.append(i)
+                    paths.append(path)
+                    priors.append(probability)
+                    guesses.append(station)
         objects = np.array(owners, dtype=np.int64)
         places = self._paths.project(stretches_of(paths), np.array(guesses), movers.points[objects])
         config = self._config
@@ -174,32 +175,45 @@ class LaneFollowing:
         return shared if len(kept) == len(weights) else shared.chosen(kept)
 
     def _advance(self, candidates: Candidates, tracks: Sequence[int]) -> None:
-        """Moves anchors on to where the likeliest continuation has the object; past junctions to the next lane."""
+        """Moves anchors on to where the likeliest continuation has the object; past junctions to the next lane.
+
+        Who was found on a junction stays anchored to all lanes there of which a continuation is left.
+        """
         order = np.lexsort((-candidates.probabilities, candidates.owners))
         stations = candidates.placements.stations.tolist()
-        seen = -1
+        seen, is_open = -1, False
         for row, owner in zip(order.tolist(), candidates.owners[order].tolist(), strict=True):
-            if owner == seen:
+            if owner == seen and not is_open:
                 continue
-            seen = owner
             anchor, path, station = self._anchors[tracks[owner]], candidates.paths[row], stations[row]
+            if owner == seen:
+                if all(lane != path.lanes[0] for lane, _ in anchor.places):
+                    anchor.places.append((path.lanes[0], station))
+                continue
             which = path.lane_at(station)
-            if which and not self._lanes[path.lanes[which]].is_internal:
-                anchor.lane, anchor.station = path.lanes[which], station - path.starts[which]
-            else:
-                anchor.station = station
+            if self._lanes[path.lanes[which]].is_internal:
+                which = 0
+            anchor.places = [(path.lanes[which], station - path.starts[which])]
+            seen, is_open = owner, self._lanes[path.lanes[which]].is_internal
 
     def _anchor(self, anchor: _Anchor, lanes: Sequence[str], point: Floats, heading: float) -> None:
-        """Anchors to the best of `lanes` that the object fits, if any."""
-        config, lowest = self._config, math.inf
+        """Anchors to the best of `lanes` that the object fits, if any; on a junction, to all that it fits there."""
+        config, fitting = self._config, []
         for name in lanes:
             lane = self._lanes[name]
             stations, offsets = lane.line.project(point)
             station, offset = float(stations[0]), abs(float(offsets[0]))
             error = abs(wrapped(heading - float(np.interp(station, lane.line.stations, lane.line.headings))))
-            cost = offset + config.heading_weight * error + (0.0 if lane.is_drivable else config.undrivable_penalty)
-            if offset <= lane.width / 2.0 + config.margin and error <= config.max_heading_error and cost < lowest:
-                lowest, anchor.lane, anchor.station = cost, name, station
+            if offset <= lane.width / 2.0 + config.margin and error <= config.max_heading_error:
+                cost = offset + config.heading_weight * error + (0.0 if lane.is_drivable else config.undrivable_penalty)
+                fitting.append((cost, (name, station)))
+        places = [place for _, place in sorted(fitting)]
+        kinds = [(self._lanes[name].is_internal, self._lanes[name].is_drivable) for name, _ in places]
+        if places and self._lanes[places[0][0]].is_internal:
+            places = [place for place, kind in zip(places, kinds, strict=True) if kind == kinds[0]]
+        else:
+            places = places[:1]
+        anchor.places = places
 
 
 def joined(one: Candidates, other: Candidates) -> Candidates:

@@ -209,6 +209,25 @@ def test_beyond_the_fork_only_the_way_taken_is_left(roadmap: RoadMap) -> None:
     assert result.lanes == (("right_0",),)
 
 
+@pytest.mark.parametrize("taken", ["bend_0", "right_0"])
+def test_who_is_first_seen_where_ways_part_may_take_each_until_it_is_seen_to_take_one(
+    roadmap: RoadMap, taken: str
+) -> None:
+    """It comes into sight on the junction, where it might have come out behind others."""
+    way = next(name for name in roadmap.lanes["in_0"].successors if taken in roadmap.lanes[name].successors)
+    prediction = MapPrediction(PredictionConfig(), roadmap)
+    told = []
+    for step, station in enumerate(np.arange(1.0, roadmap.lanes[way].line.length, 0.5)):
+        x, y, heading = lane_point(roadmap, way, station)
+        told.append(prediction.step(tracked(0.1 * step, Seen(x, y, heading, speed=5.0))))
+    assert {lanes[-1] for lanes in told[0].lanes} == {"bend_0", "right_0"}
+    assert told[0].probabilities.max() < 0.7
+    assert {lanes[-1] for lanes in told[-1].lanes} == {taken}
+    x, y, heading = lane_point(roadmap, taken, 1.0)
+    after = prediction.step(tracked(0.1 * len(told), Seen(x, y, heading, speed=5.0)))
+    assert after.lanes == ((taken,),)
+
+
 def test_a_turning_vehicle_slows_down_for_the_turn_and_one_going_straight_does_not(roadmap: RoadMap) -> None:
     result = predicted(roadmap, Seen(-30.0, RIGHT, speed=12.0))
     steps = np.hypot(*np.diff(result.poses[:, :, :2], axis=1).transpose(2, 0, 1)) / 0.25
