@@ -209,11 +209,9 @@ class LaneFollowing:
                 fitting.append((cost, (name, station)))
         places = [place for _, place in sorted(fitting)]
         kinds = [(self._lanes[name].is_internal, self._lanes[name].is_drivable) for name, _ in places]
-        if places and self._lanes[places[0][0]].is_internal:
-            places = [place for place, kind in zip(places, kinds, strict=True) if kind == kinds[0]]
-        else:
-            places = places[:1]
-        anchor.places = places
+        is_on_junction = bool(places) and kinds[0][0]
+        alike = [place for place, kind in zip(places, kinds, strict=True) if kind == kinds[0]]
+        anchor.places = alike if is_on_junction else places[:1]
 
 
 def joined(one: Candidates, other: Candidates) -> Candidates:

@@ -83,10 +83,11 @@ def blockers(
     cycle. `speed` is the ego's [m/s].
     """
     walks = _walks_along(scene)
-    if not (walks | scene.is_standing).any() and not held:
+    passed = scene.is_standing | walks
+    if not passed.any() and not held:
         return [], _NOBODY
     wanted = np.where(scene.classes == _PERSON, config.person_clearance, config.nudge_clearance)
-    limits, passed = wanted, scene.is_standing | walks
+    limits = wanted
     speeds = np.where(passed, 0.0, scene.speeds)  # all the way of who walks is taken
     if held:
         is_held = np.array([track in held for track in scene.ids], dtype=np.bool_)
