@@ -16,18 +16,18 @@ def written(folder: Path, lanes: int) -> list[str]:
     nodes: list[str] = []
     edges: list[str] = []
     for place in ((column, row) for column in range(_SIZE) for row in range(_SIZE)):
-        x, y = (_BETWEEN * count for count in place)
+        x, y = (_BETWEEN * index for index in place)
         ring = [_ring_node(place, side) for side in range(4)]
         for side, (east, north) in enumerate(_SIDES):
             nodes.append(_node(ring[side], x + _RADIUS[lanes] * east, y + _RADIUS[lanes] * north))
             edges.append(_quarter(ring, side, x, y, lanes))
             neighbour = (place[0] + east, place[1] + north)
-            if not all(0 <= count < _SIZE for count in neighbour):
+            if all(0 <= index < _SIZE for index in neighbour):
+                edges.append(_road(ring[side], _ring_node(neighbour, (side + 2) % 4), lanes))
+            else:
                 out = f"out{ring[side]}"
                 nodes.append(_node(out, x + _ARM * east, y + _ARM * north))
                 edges += [_road(ring[side], out, lanes), _road(out, ring[side], lanes)]
-            else:
-                edges.append(_road(ring[side], _ring_node(neighbour, (side + 2) % 4), lanes))
         names = " ".join(f"{node}.ring" for node in ring)
         edges.append(f'<roundabout nodes="{" ".join(ring)}" edges="{names}"/>')
     (folder / "net.nod.xml").write_text(f"<nodes>{''.join(nodes)}</nodes>")
