@@ -220,28 +220,47 @@ def leading(
 ) -> tuple[list[int], list[int]]:
     """Moving futures on the path, as rows of the graph: those that lead (or come towards) the ego, and the rest.
 
-    `lanes` are those of the ego's route. Left out are unlikely futures that are not about to happen, and who drives
+    `lanes` are those of the ego's route. Left out are unlikely futures that are not about to happen, unless those of
+    one object are a likely one together (ways that fork again soon share one probability), and who drives
     behind the ego, unless it passes where the path swings out, and crosses the path then: first, or on a lane of its
     own. People beside it do not lead it, nor who comes by its front already.
     """
-    scene, futures = graph.scene, graph.scene.futures
+    scene = graph.scene
     leaders: list[int] = []
     others: list[int] = []
+    unlikely: dict[int, list[int]] = {}
     for row, first in enumerate(graph.first[: scene.moving]):
         if not graph.occupied[row, first]:
             continue
-        entry = scene.times[first]
-        if scene.probabilities[row] < (config.possible if entry < config.soon else config.likely):
+        leads = _leads(row, graph, lanes, shape, config)
+        if leads is None:
             continue
-        is_in_lane = futures.directions[row, 0] > ALONG and graph.gaps[row, : first + 1].max() < config.object_margin
-        is_beside = graph.low[row, 0] < shape.front and (scene.is_person[row] or futures.directions[row, 0] < -ALONG)
-        if is_beside or abs(futures.directions[row, first]) < ALONG or (entry > PRESENT and not is_in_lane):
-            others.append(row)
-        elif futures.stations[row, 0] > shape.centre:
-            (leaders if entry <= PRESENT else others).append(row)
-        elif not is_in_lane or (not lanes.issuperset(scene.lanes[row]) and graph.is_off_lane(row, shape.width)):
-            others.append(row)
-    return leaders, others
+        is_soon = scene.times[first] < config.soon
+        if scene.probabilities[row] < (config.possible if is_soon else config.likely):
+            unlikely.setdefault(int(scene.owners[row]), []).append(row)
+        else:
+            (leaders if leads else others).append(row)
+    for rows in unlikely.values():
+        if scene.probabilities[rows].sum() >= config.likely:
+            others += rows
+    return leaders, sorted(others)
+
+
+def _leads(row: int, graph: Graph, lanes: frozenset[str], shape: VehicleShape, config: PlanningConfig) -> bool | None:
+    """Whether future `row`, on the path, leads the ego (or comes towards it), or crosses or joins its way.
+
+    None of who drives behind it, and does neither.
+    """
+    scene, futures, first = graph.scene, graph.scene.futures, graph.first[row]
+    is_there = scene.times[first] <= PRESENT
+    is_in_lane = futures.directions[row, 0] > ALONG and graph.gaps[row, : first + 1].max() < config.object_margin
+    is_beside = graph.low[row, 0] < shape.front and (scene.is_person[row] or futures.directions[row, 0] < -ALONG)
+    if is_beside or abs(futures.directions[row, first]) < ALONG or not (is_there or is_in_lane):
+        return False
+    if futures.stations[row, 0] > shape.centre:
+        return bool(is_there)
+    is_crossing = not is_in_lane or (not lanes.issuperset(scene.lanes[row]) and graph.is_off_lane(row, shape.width))
+    return False if is_crossing else None
 
 
 def leader_of(rows: list[int], graph: Graph, shape: VehicleShape) -> Leader | None:

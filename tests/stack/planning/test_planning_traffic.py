@@ -816,6 +816,23 @@ def test_unlikely_future_is_ignored_and_a_likely_one_is_not() -> None:
     assert decisions == {0.1: "cruise", 0.5: "yield 3"}
 
 
+@pytest.mark.parametrize(("crossing", "decision"), [(1, "cruise"), (2, "yield 3")])
+def test_unlikely_futures_of_one_object_count_that_are_a_likely_one_together(crossing: int, decision: str) -> None:
+    """It stays beside the road with the likely one, and crosses with one of the others, or with both."""
+    moved = predicted([person(3, 60.0, -6.0, heading=UP, speed=1.4)], 0.0)
+    poses = np.tile(moved.poses, (3, 1, 1))
+    poses[crossing:, :, 1] = -6.0
+    futures = msgspec.structs.replace(
+        moved,
+        owners=np.zeros(3, dtype=np.int64),
+        probabilities=np.array([0.1, 0.1, 0.8]),
+        poses=poses,
+        lanes=moved.lanes * 3,
+    )
+    trajectory = Planner(PlanningConfig(), road(), SHAPE).step(believed(5.0, speed=12.0), futures, {})
+    assert trajectory.decision == decision
+
+
 @pytest.mark.parametrize(("chance", "decision"), [(0.25, "cruise"), (0.75, "yield 3")])
 def test_for_an_unlikely_future_the_ego_does_not_stop_in_the_way_of_a_likely_one(chance: float, decision: str) -> None:
     """Who sets off beside the road crosses right behind the ego, or turns to where the ego would be next."""
