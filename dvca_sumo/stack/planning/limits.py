@@ -1,20 +1,17 @@
-"""What bounds the speed whoever has the right of way: limits, curves, narrow gaps, and places to stop at."""
+"""What bounds the speed whoever has the right of way: limits, curves, narrow gaps, and who may set off."""
 
 import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from dvca_sumo.geometry.boxes import corners
-from dvca_sumo.messages import PREDICTION_STEP, Floats, Integers, ObjectClass, VehicleShape
+from dvca_sumo.messages import PREDICTION_STEP, Floats, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Control, Crossing
-from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.exits import Ahead, ahead, is_blocked
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.reference import BEHIND
-from dvca_sumo.stack.planning.scene import ALONG, Flags
-from dvca_sumo.stack.planning.speed import Stop, slowed_before
+from dvca_sumo.stack.planning.scene import ALONG
+from dvca_sumo.stack.planning.speed import slowed_before
 from dvca_sumo.stack.planning.st_graph import AT_CROSSING, Graph
 
 _PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
@@ -32,12 +29,9 @@ _BEFORE_WAITING = 3.0  # [m/s] in front of who has priority and stands ...
 _NOSE = 6.0  # ... so near to the ego's way [m] ...
 _ROOM_TO_STOP = 3.0  # ... and as far before it, should it set off [m]
 _AT_KERB = 1.5  # [m/s] before people who stand at the kerb of a crossing and may set off with the ego ...
-_OUTLOOK = 6.0  # ... so far before them [m]; ...
-_UNHURRIED = 4.0  # ... [m/s] who is faster they let pass
-_OCCUPIED = "stop exit occupied"
-_HERE = 0.1  # [m] is as near to a place as being at it
-_GIVE_AT_DESTINATION = 1.0  # [m]
-_GIVE_AT_OBJECT = 1.0  # [m] of the distance to it is never spent
+_UNHURRIED = 4.0  # ... that is slower than that [m/s]; ...
+_BEFORE_PRIOR = 4.5  # ... [m/s] who is faster they let pass, but may set off all the same where they have priority ...
+_OUTLOOK = 6.0  # ... so far before them [m]
 
 
 def speed_caps(
@@ -87,9 +81,8 @@ def _slow_stretches(
         yield front[row] - room, rear[row], cap
     for row in _waiting(graph, views):
         yield front[row] - _ROOM_TO_STOP, rear[row], _BEFORE_WAITING
-    if speed < _UNHURRIED:
-        for row in _at_kerbs(graph, views, crossings, config):
-            yield front[row] - _OUTLOOK, graph.high[row, 0] - shape.front, _AT_KERB
+    for row in _at_kerbs(speed, graph, views, crossings, config):
+        yield front[row] - _OUTLOOK, graph.high[row, 0] - shape.front, _AT_KERB if speed < _UNHURRIED else _BEFORE_PRIOR
     for view in views:
         distance = view.distance
         if not view.goes_first or view.line.control is _PRIORITY:
@@ -123,24 +116,30 @@ def _waiting(graph: Graph, views: list[LineView]) -> list[int]:
     return [row for row, is_one in zip(rows, waits.tolist(), strict=True) if is_one]
 
 
-def _at_kerbs(graph: Graph, views: list[LineView], crossings: Sequence[Crossing], config: PlanningConfig) -> list[int]:
-    """People who stand beside a crossing ahead, and may use it at any time: not while a signal has them wait.
-
-    As rows of the graph.
-    """
+def _at_kerbs(
+    speed: float, graph: Graph, views: list[LineView], crossings: Sequence[Crossing], config: PlanningConfig
+) -> list[int]:
+    """Rows of people who stand beside a crossing ahead, and may use it before an ego of such a `speed` [m/s]."""
     scene, still = graph.scene, slice(graph.scene.moving, None)
     gaps = graph.gaps[still, 0]
     stands = scene.is_person[still] & (gaps > 0.0) & (gaps < config.crossing_margin)
     if not stands.any():
         return []
-    closed = frozenset().union(*(view.line.crosses for view in views if _is_green(view)))
     places = scene.futures.stations[still, 0] + graph.window.station
     waits = np.zeros_like(stands)
-    for crossing in crossings:
-        if crossing.lane not in closed:
-            waits |= (places > crossing.start_station - AT_CROSSING) & (places < crossing.end_station + AT_CROSSING)
+    for crossing in _in_use(speed, views, crossings):
+        waits |= (places > crossing.start_station - AT_CROSSING) & (places < crossing.end_station + AT_CROSSING)
     rows: list[int] = (scene.moving + (stands & waits).nonzero()[0]).tolist()
     return rows
+
+
+def _in_use(speed: float, views: list[LineView], crossings: Sequence[Crossing]) -> list[Crossing]:
+    """Where people have priority; with a slow ego before it any crossing, unless a signal has them wait."""
+    if speed < _UNHURRIED:
+        closed = frozenset().union(*(view.line.crosses for view in views if _is_green(view)))
+        return [crossing for crossing in crossings if crossing.lane not in closed]
+    prior = frozenset().union(*(view.goes_first for view in views))
+    return [crossing for crossing in crossings if crossing.lane in prior]
 
 
 def _is_green(view: LineView) -> bool:
@@ -162,90 +161,6 @@ def _hiding(graph: Graph, line: float) -> float:
     waits = is_slow[rows, first] & (gaps > 0.0) & (gaps < _BESIDE) & (np.abs(noses - line) < _AT_LINE)
     waits &= (scene.futures.directions[:, 0] > ALONG) & (scene.classes[scene.owners] == _VEHICLE)
     return float(noses[waits].max(initial=-math.inf))
-
-
-def nearest_stop(
-    to_destination: float,
-    speed: float,
-    graph: Graph,
-    views: list[LineView],
-    shape: VehicleShape,
-    config: PlanningConfig,
-) -> Stop:
-    """The first place where the ego has to stop whatever others do: destination, line, object, occupied exit.
-
-    `to_destination` counts from the front bumper [m]; `speed` is the ego's [m/s].
-    """
-    stops = [Stop(to_destination, _GIVE_AT_DESTINATION, "stop destination")]
-    stops += [_at_line(view, view.stop) for view in views if view.stop]
-    obstacle = _obstacle(graph, shape, config)
-    if obstacle is not None:
-        label = f"stop behind {graph.track(obstacle)}"
-        gap = -config.object_gap if config.stops_past_objects else config.object_gap
-        usual = float(graph.low[obstacle, 0]) - shape.front - gap
-        closer = _closing_up(usual, views, shape, config)
-        stops.append(Stop(usual + closer, config.object_gap - closer - _GIVE_AT_OBJECT, label))
-    if views and np.count_nonzero(graph.occupied):
-        those = ahead(graph, speed, shape, config)
-        for view in views:
-            stops += _before_blocked(view, those, speed, shape, config)
-    return min(stops, key=lambda stop: stop.at)
-
-
-def _before_blocked(
-    view: LineView, those: Ahead, speed: float, shape: VehicleShape, config: PlanningConfig
-) -> Iterator[Stop]:
-    """At the line, and at the place on the junction where others are let pass, if there is one."""
-    if is_blocked(view, view.distance, those, speed, shape, config):
-        yield _at_line(view, _OCCUPIED)
-    place = view.waiting_distance
-    is_inside = place > view.distance and view.may_wait
-    if is_inside and is_blocked(view, max(place, _HERE), those, speed, shape, config):
-        yield Stop(place, config.stop_line_gap, _OCCUPIED)
-
-
-def _closing_up(usual: float, views: list[LineView], shape: VehicleShape, config: PlanningConfig) -> float:
-    """How much further than at a `usual` place the front bumper stops, so that the rear one is off a junction [m]."""
-    for view in views:
-        left = view.exit_distance - (usual - shape.length)
-        if view.line.crosses and 0.0 < left <= config.object_gap - config.follow_gap:
-            return left
-    return 0.0
-
-
-def _at_line(view: LineView, label: str) -> Stop:
-    return Stop(view.standing_distance, view.gap, label)
-
-
-def _obstacle(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> int | None:
-    """The nearest future that stands in the way, as a row; not one that the front bumper has cleared already.
-
-    In the way is also what leaves the path no room between its bounds, and what the body, beside it, would touch:
-    people nearly so.
-    """
-    scene, blocker = graph.scene, blocking(graph, shape, config)
-    still = slice(scene.moving, None)
-    occupied = graph.occupied[still, 0]
-    if blocker is None and not np.count_nonzero(occupied):
-        return None
-    low = graph.low[still, 0]
-    nearest = np.where(scene.is_person[still], config.person_least, 0.0)
-    is_beside = occupied & (low <= shape.front) & (graph.gaps[still, 0] < nearest)
-    if is_beside.any():
-        is_beside[is_beside] = ~_is_behind(graph, scene.owners[still][is_beside], shape)
-    in_way = is_beside | (occupied & (low > shape.front))
-    if blocker is not None:
-        in_way |= scene.owners[still] == blocker
-    return scene.moving + int(np.where(in_way, low, np.inf).argmin()) if in_way.any() else None
-
-
-def _is_behind(graph: Graph, rows: Integers, shape: VehicleShape) -> Flags:
-    """Whether objects, as `rows` (k,) of the scene, are wholly behind the rear bumper, however near: (k,)."""
-    path = graph.path
-    spots = corners(graph.scene.boxes[rows]) - np.array([path.x[0], path.y[0]])
-    ahead = spots @ np.array([math.cos(path.headings[0]), math.sin(path.headings[0])])
-    behind: Flags = ahead.max(axis=1) < -shape.rear_overhang
-    return behind
 
 
 def _passing_speeds(graph: Graph, config: PlanningConfig) -> list[tuple[int, float, float]]:

@@ -19,7 +19,7 @@ from dvca_sumo.stack.planning.destination import stop_station
 from dvca_sumo.stack.planning.junctions import Junctions, LineView
 from dvca_sumo.stack.planning.lane_changing import LaneChanger, LaneChoice
 from dvca_sumo.stack.planning.lane_gaps import Gaps
-from dvca_sumo.stack.planning.limits import nearest_stop, speed_caps
+from dvca_sumo.stack.planning.limits import speed_caps
 from dvca_sumo.stack.planning.meeting import Demand, Meetings
 from dvca_sumo.stack.planning.nudging import Nudge, NudgeDecider
 from dvca_sumo.stack.planning.oncoming import waits
@@ -33,6 +33,7 @@ from dvca_sumo.stack.planning.speed import Profile, Stop, roll_out
 from dvca_sumo.stack.planning.st_graph import Graph, graph_of, leader_of, leading
 from dvca_sumo.stack.planning.standing import Standing
 from dvca_sumo.stack.planning.start import StartState, start_state
+from dvca_sumo.stack.planning.stops import nearest_stop
 
 _HORIZON = float(TRAJECTORY_TIMES[-1])  # [s]
 _SPARE = 30.0  # [m] of window beyond what can be driven within the horizon

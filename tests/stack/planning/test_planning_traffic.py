@@ -291,6 +291,20 @@ def test_people_go_first_but_before_a_crossing_where_they_have_to_wait(
     assert ("yield 3" in driven.decisions) is is_waited_for
 
 
+@pytest.mark.parametrize(("yields_to", "is_slow"), [(frozenset({"c"}), True), (frozenset(), False)])
+def test_past_people_at_the_kerb_of_a_crossing_where_they_have_priority_the_ego_could_stop(
+    yields_to: frozenset[str],
+    is_slow: bool,  # noqa: FBT001
+) -> None:
+    line = stop_line(112.0, Control.YIELD, yields_to=yields_to, crosses=frozenset({"c"}))
+    route = road(stop_lines=[line], crossings=[Crossing("c", 114.0, 118.0)])
+    waiting = person(3, 117.0, -2.4, heading=UP)
+    driven = drive(route, 12.0, station=70.0, speed=12.0, actors=[waiting])
+    before = (driven.fronts > 112.0) & (driven.fronts < 116.0)
+    assert bool(driven.speeds[before].max() < 4.7) is is_slow
+    assert driven.speeds[-1] > 8.0
+
+
 @pytest.mark.parametrize(
     ("speed", "control", "is_slow"),
     [
