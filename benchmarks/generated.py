@@ -51,11 +51,24 @@ NETS = {
     "right_on_red": Net(0.7, [*BLOCKS, LANES, f"{SIGNALS}_right_on_red"]),
     "stop_signs": Net(1.0, ["--grid", "--grid.number=5", "--grid.length=120", LANES, f"{TYPE}=priority_stop"]),
     "people": Net(1.5, ["--grid", "--grid.number=5", "--grid.length=150", SIGNALS, *WALKS]),
+    "people_priority": Net(1.5, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=priority", *WALKS]),
+    "people_left_hand": Net(1.5, [*SMALL_SPIDER, "--spider.omit-center", "--lefthand", SIGNALS, *WALKS]),
     "mixed_random": Net(
         0.9, [*RANDOM, "--rand.random-lanenumber", "--rand.random-priority", SIGNALS, "--turn-lanes=1"], is_mixed=True
     ),
     "mixed_sublane": Net(
         0.9, ["--grid", "--grid.number=5", "--grid.length=160", LANES, SIGNALS], is_mixed=True, is_sublane=True
+    ),
+    "mixed_left_hand": Net(
+        0.9,
+        [*RANDOM, "--lefthand", "--rand.random-lanenumber", "--rand.random-priority", SIGNALS, "--turn-lanes=1"],
+        is_mixed=True,
+    ),
+    "mixed_priority": Net(
+        0.9, ["--grid", "--grid.number=5", "--grid.length=140", LANES, f"{TYPE}=priority"], is_mixed=True
+    ),
+    "mixed_sublane_random": Net(
+        0.9, [*RANDOM, LANES, f"{TYPE}=priority", "--rand.random-priority=true"], is_mixed=True, is_sublane=True
     ),
     "roundabouts": Net(1.2, [], round_lanes=1),
     "wide_roundabouts": Net(0.8, [], round_lanes=2),
