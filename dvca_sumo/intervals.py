@@ -37,10 +37,14 @@ def share_of(count: int, total: int) -> Share:
     """A share with its interval; of nothing it is unknown: from 0 to 1."""
     if total == 0:
         return Share(count, total, 0.0, 1.0)
-    rate, square = count / total, _Z * _Z
-    middle = (rate + square / (2 * total)) / (1 + square / total)
-    reach = _Z * math.sqrt(rate * (1 - rate) / total + square / (4 * total * total)) / (1 + square / total)
-    return Share(count, total, max(middle - reach, 0.0), min(middle + reach, 1.0))
+    return Share(count, total, _least_share(count, total), 1.0 - _least_share(total - count, total))
+
+
+def _least_share(count: int, total: int) -> float:
+    """The low end of Wilson's interval: exactly 0 of none."""
+    square = _Z * _Z
+    reach = math.sqrt(square * (count * (total - count) / total + square / 4))
+    return (count + square / 2 - reach) / (total + square)
 
 
 def rate_of(count: int, exposure: float) -> Rate:

@@ -16,6 +16,11 @@ def test_the_interval_of_a_share_is_wilsons(count: int, total: int, low: float, 
     assert share.high == pytest.approx(high, abs=1e-4)
 
 
+def test_the_interval_of_none_begins_at_0_and_that_of_all_ends_at_1() -> None:
+    for total in range(1, 200):
+        assert (share_of(0, total).low, share_of(total, total).high) == (0.0, 1.0)
+
+
 @pytest.mark.parametrize(
     ("count", "low", "high"),
     [
