@@ -24,6 +24,8 @@ SIGNALS, WALKS = "--default-junction-type=traffic_light", ["--sidewalks.guess.fr
 SPIDER = ["--spider", "--spider.arm-number=7", "--spider.circle-number=5", "--spider.space-radius=120"]
 SMALL_SPIDER = ["--spider", "--spider.arm-number=5", "--spider.circle-number=3", "--spider.space-radius=130"]
 RANDOM = ["--rand", "--rand.iterations=120"]
+RANDOM_SIGNALS = [*RANDOM, "--rand.random-lanenumber", "--rand.random-priority", SIGNALS, "--turn-lanes=1"]
+GRID = ["--grid", "--grid.number=5", "--grid.length=150"]
 BLOCKS = ["--grid", "--grid.number=4", "--grid.length=200"]
 
 
@@ -38,10 +40,10 @@ class Net(NamedTuple):
 
 
 NETS = {
-    "all_way_stop": Net(1.5, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=allway_stop"]),
+    "all_way_stop": Net(1.5, [*GRID, f"{TYPE}=allway_stop"]),
     "left_hand": Net(1.2, ["--grid", "--grid.number=5", "--grid.length=180", "--lefthand", LANES, "--turn-lanes=1"]),
     "right_before_left": Net(1.2, [*SPIDER, f"{TYPE}=right_before_left"]),
-    "right_before_left_grid": Net(1.2, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=right_before_left"]),
+    "right_before_left_grid": Net(1.2, [*GRID, f"{TYPE}=right_before_left"]),
     "right_before_left_random": Net(1.2, [*RANDOM, f"{TYPE}=right_before_left"]),
     "priority_random": Net(0.8, [*RANDOM, LANES, f"{TYPE}=priority", "--rand.random-priority=true"]),
     "signals": Net(0.8, [*RANDOM, LANES, SIGNALS]),
@@ -50,20 +52,14 @@ NETS = {
     "turn_lanes": Net(0.8, [*BLOCKS, "--turn-lanes=1", "--turn-lanes.length=40", LANES, SIGNALS]),
     "right_on_red": Net(0.7, [*BLOCKS, LANES, f"{SIGNALS}_right_on_red"]),
     "stop_signs": Net(1.0, ["--grid", "--grid.number=5", "--grid.length=120", LANES, f"{TYPE}=priority_stop"]),
-    "people": Net(1.5, ["--grid", "--grid.number=5", "--grid.length=150", SIGNALS, *WALKS]),
-    "people_priority": Net(1.5, ["--grid", "--grid.number=5", "--grid.length=150", f"{TYPE}=priority", *WALKS]),
+    "people": Net(1.5, [*GRID, SIGNALS, *WALKS]),
+    "people_priority": Net(1.5, [*GRID, f"{TYPE}=priority", *WALKS]),
     "people_left_hand": Net(1.5, [*SMALL_SPIDER, "--spider.omit-center", "--lefthand", SIGNALS, *WALKS]),
-    "mixed_random": Net(
-        0.9, [*RANDOM, "--rand.random-lanenumber", "--rand.random-priority", SIGNALS, "--turn-lanes=1"], is_mixed=True
-    ),
+    "mixed_random": Net(0.9, RANDOM_SIGNALS, is_mixed=True),
     "mixed_sublane": Net(
         0.9, ["--grid", "--grid.number=5", "--grid.length=160", LANES, SIGNALS], is_mixed=True, is_sublane=True
     ),
-    "mixed_left_hand": Net(
-        0.9,
-        [*RANDOM, "--lefthand", "--rand.random-lanenumber", "--rand.random-priority", SIGNALS, "--turn-lanes=1"],
-        is_mixed=True,
-    ),
+    "mixed_left_hand": Net(0.9, [*RANDOM_SIGNALS, "--lefthand"], is_mixed=True),
     "mixed_priority": Net(
         0.9, ["--grid", "--grid.number=5", "--grid.length=140", LANES, f"{TYPE}=priority"], is_mixed=True
     ),

@@ -221,9 +221,9 @@ def leading(
     """Moving futures on the path, as rows of the graph: those that lead (or come towards) the ego, and the rest.
 
     `lanes` are those of the ego's route. Left out are unlikely futures that are not about to happen, unless those of
-    one object are a likely one together (ways that fork again soon share one probability), and who drives
-    behind the ego, unless it passes where the path swings out, and crosses the path then: first, or on a lane of its
-    own. People beside it do not lead it, nor who comes by its front already.
+    one object are a likely one together (ways that fork again soon share one probability), and who drives behind the
+    ego, unless it passes where the path swings out, and crosses the path then: first, or on a lane of its own. People
+    beside it do not lead it, nor who comes by its front already.
     """
     scene = graph.scene
     leaders: list[int] = []
