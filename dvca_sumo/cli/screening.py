@@ -91,8 +91,7 @@ def screen(
     """  # noqa: D301 - click wants the very character, not its escape
     if output is not None:
         make_folder(output)
-    load_scenario(sumocfg, AUTO, seed, begin, end)  # refuses an end that is none
-    setting = Setting(load_scenario(sumocfg, AUTO, seed, begin), end, egos, concurrent, StackSource(stack))
+    setting = Setting.of_window(load_scenario(sumocfg, AUTO, seed, begin, end), egos, concurrent, StackSource(stack))
     stores = Stores()
     if output is not None:
         stores = Stores(Store(output / "draws.jsonl", Draw), Store(output / "simulations.jsonl", Driven))

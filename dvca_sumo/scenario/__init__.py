@@ -54,6 +54,11 @@ class Scenario(msgspec.Struct, frozen=True):
     overrides: tuple[Override, ...]
 
     @property
+    def configured_end(self) -> float | None:
+        """When the configuration ends the simulation [s]; None: it does not."""
+        return _configured_end(self.configuration)
+
+    @property
     def arguments(self) -> tuple[str, ...]:
         """SUMO's command line, but for its input files (see `input_words`)."""
         words = ["-c", str(self.configuration.path)]
@@ -84,8 +89,7 @@ def load_scenario(
     for name, value in (("begin", begin), ("end", end)):
         if value is not None and not (math.isfinite(value) and value >= 0.0):
             raise ScenarioError(f"{name} is no time: {value} (allowed: seconds, 0 or more)")
-    configured_end = seconds(options["end"], "end") if "end" in options else -1.0
-    chosen_end = end if end is not None else (configured_end if configured_end > 0 else None)
+    chosen_end = end if end is not None else _configured_end(configuration)
     if chosen_end is not None and chosen_end <= chosen_begin:
         raise ScenarioError(f"the scenario ends at {chosen_end:g} s, not after its begin at {chosen_begin:g} s")
     return Scenario(
@@ -96,6 +100,12 @@ def load_scenario(
         end=chosen_end,
         overrides=_overrides(configuration, chosen_seed, chosen_begin),
     )
+
+
+def _configured_end(configuration: Configuration) -> float | None:
+    options = configuration.options
+    end = seconds(options["end"], "end") if "end" in options else -1.0
+    return end if end > 0.0 else None
 
 
 def _overrides(configuration: Configuration, seed: int, begin: float) -> tuple[Override, ...]:

@@ -28,10 +28,20 @@ class Setting(msgspec.Struct, frozen=True):
     """What is asked."""
 
     scenario: Scenario  # as `run` would load it for each ego
-    window_end: float | None  # [s] trips are over by then; None: the scenario's end
+    window_end: float | None  # [s] trips are to be over by then; None: no end is known
     egos: int
     concurrent: int
     source: StackSource
+
+    @classmethod
+    def of_window(cls, window: Scenario, egos: int, concurrent: int, source: StackSource) -> "Setting":
+        """Trips that are over by the end of `window`; one that is held up goes on to the configuration's end, if later.
+
+        Without an end in the configuration, it goes on for as long as an ego's patience is.
+        """
+        configured = window.configured_end
+        end = None if configured is None or window.end is None else max(configured, window.end)
+        return cls(msgspec.structs.replace(window, end=end), window.end, egos, concurrent, source)
 
 
 class Screening(msgspec.Struct, frozen=True):
@@ -117,7 +127,7 @@ class _Work:
 
     def _draw(self) -> Draw:
         setting = self._setting
-        window = msgspec.structs.replace(setting.scenario, end=setting.window_end or setting.scenario.end)
+        window = msgspec.structs.replace(setting.scenario, end=setting.window_end)
         key = key_of([self._asked, "draw", setting.egos, window.end])
         known = self._stores.draws and self._stores.draws.find(key)
         if known:

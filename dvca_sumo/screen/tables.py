@@ -27,7 +27,7 @@ def json_of(screening: Screening) -> Json:
             "config": str(scenario.configuration.path),
             "seed": scenario.seed,
             "begin": scenario.begin,
-            "end": setting.window_end if setting.window_end is not None else scenario.end,
+            "end": setting.window_end,
             "egos": setting.egos,
             "concurrent": setting.concurrent,
             "stack": setting.source.stack,
@@ -89,6 +89,8 @@ def command(setting: Setting, ego: str) -> str:
     scenario = setting.scenario
     words = ["dvca-sumo", "run", str(scenario.configuration.path), "--ego", ego]
     words += ["--seed", str(scenario.seed), "--begin", f"{scenario.begin:.12g}"]
+    if scenario.end is not None and scenario.end != scenario.configured_end:
+        words += ["--end", f"{scenario.end:.12g}"]
     return shlex.join([*words, *(["--stack", setting.source.stack] if setting.source.stack else [])])
 
 

@@ -8,14 +8,14 @@ import pytest
 from command_line import assert_one_error, typed
 from screen_scenes import traffic
 
-from dvca_sumo.scenario import Scenario
+from dvca_sumo.scenario import AUTO, Scenario, load_scenario
 from dvca_sumo.screen.driving import Driven
 from dvca_sumo.screen.judging import Fault, Judged
 from dvca_sumo.screen.neighbours import Neighbours
 from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.screening import Progress, Screening, Setting, Stores, excused, screened
 from dvca_sumo.screen.summary import summary_of
-from dvca_sumo.screen.tables import has_failed, has_gaps, json_of, terminal_text
+from dvca_sumo.screen.tables import command, has_failed, has_gaps, json_of, terminal_text
 from dvca_sumo.screen.trips import Draw
 from dvca_sumo.stack.sources import StackSource
 from dvca_sumo.store import Store
@@ -39,7 +39,7 @@ class Heard(Progress):
 def screening_of(
     scenario: Scenario, stack: str | None = None, folder: Path | None = None, progress: Progress | None = None
 ) -> Screening:
-    setting = Setting(scenario, None, 3, 5, StackSource(stack))
+    setting = Setting.of_window(scenario, 3, 5, StackSource(stack))
     stores = Stores()
     if folder is not None:
         stores = Stores(Store(folder / "draws.jsonl", Draw), Store(folder / "simulations.jsonl", Driven))
@@ -136,6 +136,31 @@ def test_the_text_puts_both_drivers_side_by_side(reckless: Screening) -> None:
     assert "SUMO's driver" in text
     assert "alone: yes" in text
     assert "2 trips drawn of 2 departures (no more than that of 3 asked for)" in text
+
+
+def test_trips_after_the_configurations_end_are_driven_where_an_end_after_it_is_asked_for(
+    tmp_path: Path, street: Path
+) -> None:
+    configured = traffic(tmp_path, street, ROUTES, end="5").configuration.path
+    screening = screening_of(load_scenario(configured, AUTO, end=200.0), "small_stacks:full_throttle")
+    assert [trip.outcome for trip in screening.sumo_driver] == [TripOutcome.ARRIVED] * 2
+    assert json_of(screening)["scenario"]["end"] == 200.0
+    (told,) = {one["command"].partition("--begin")[2] for one in json_of(screening)["violations"]}
+    assert told == " 0 --end 200 --stack small_stacks:full_throttle"
+
+
+@pytest.mark.parametrize(
+    ("configured", "asked", "end", "window_end"),
+    [(None, None, None, None), (None, 40.0, None, 40.0), ("60", None, 60.0, 60.0), ("60", 40.0, 60.0, 40.0)],
+)
+def test_trips_that_are_held_up_go_on_to_the_configurations_end(
+    tmp_path: Path, street: Path, configured: str | None, asked: float | None, end: float | None, window_end: float
+) -> None:
+    options = {} if configured is None else {"end": configured}
+    scenario = load_scenario(traffic(tmp_path, street, ROUTES, **options).configuration.path, AUTO, end=asked)
+    setting = Setting.of_window(scenario, 3, 5, StackSource(None))
+    assert (setting.scenario.end, setting.window_end) == (end, window_end)
+    assert "--end" not in command(setting, "first")
 
 
 def test_a_mesoscopic_scenario_is_refused(tmp_path: Path, street: Path) -> None:
