@@ -12,7 +12,7 @@ from dvca_sumo.roadmap import RouteError
 from dvca_sumo.run import Departing, free_flow, opened
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.stack.reference import reference_stack
-from dvca_sumo.world import CARS, Entry, World
+from dvca_sumo.world import CARS, LONGEST_CAR, Entry, World
 
 SHORTEST = 300.0  # [m] of a trip
 FREE_FLOW, MARGIN = 1.5, 60.0  # so many times its free-flow time and so many seconds, and a trip must be over
@@ -52,7 +52,7 @@ class _Departure(msgspec.Struct, frozen=True):
 def drawn(scenario: Scenario, count: int) -> Draw:
     """Draw `count` trips, or as many as there are, in this process: one run of SUMO without any ADS.
 
-    A trip is drivable when the vehicle is of a car's class, `--ego` accepts its name, its route is at least
+    A trip is drivable when the vehicle is of a car's class and size, `--ego` accepts its name, its route is at least
     `SHORTEST` long and can be driven on the map, and it would be over before the scenario's end, and before an ego's
     patience is: where traffic stands for ever, no driver's way leads anywhere. SUMO's own driver says how long it takes
     (but for one with stops of its own). The draw goes round the time windows; in each the trip is taken that begins
@@ -101,8 +101,10 @@ def _departures(
                 refused[f"of class {vehicle_class}"] += 1
             elif not departing.definitions.has(name):
                 refused["not named in the scenario's files"] += 1
+            elif (entry := departing.entry(name, world)).length > LONGEST_CAR:
+                refused[f"longer than {LONGEST_CAR:g} m"] += 1
             else:
-                entries[name] = departing.entry(name, world)
+                entries[name] = entry
         for name in world.arrived():
             if name in entries and not entries[name].stops:  # which its trip goes without
                 durations[name] = world.time - entries[name].time

@@ -14,12 +14,24 @@ from dvca_sumo.world.obstacles import joined
 from dvca_sumo.world.session import Session
 from dvca_sumo.world.vehicle import ControlCommandError, Vehicle, VehicleLimits
 
-__all__ = ["CARS", "ControlCommandError", "Ego", "Entry", "Native", "Vehicle", "VehicleLimits", "World", "shape_of"]
+__all__ = [
+    "CARS",
+    "LONGEST_CAR",
+    "ControlCommandError",
+    "Ego",
+    "Entry",
+    "Native",
+    "Vehicle",
+    "VehicleLimits",
+    "World",
+    "shape_of",
+]
 
 RADIUS = 150.0  # [m] around an ego within which other bodies are observed; beyond every sensor's range
 AUTO_DELAY = 60.0  # [s] after the begin, so that a chosen ego meets traffic
 LONGEST_DELAY = 600.0  # [s] beyond its departure time an ego's road will not clear any more
 CARS = ("passenger", "private", "taxi", "evehicle")  # vehicle classes that are driven like a car
+LONGEST_CAR = 7.0  # [m]; a type without a class, of a bus say, is of the class of cars
 
 
 class World:
@@ -173,4 +185,6 @@ def _objection(entry: Entry, is_fit: Callable[[Entry], bool]) -> str:
     """Why `auto` does not choose a vehicle; empty if it does."""
     if entry.vehicle_class not in CARS:
         return f"of class {entry.vehicle_class}"
+    if entry.length > LONGEST_CAR:
+        return f"longer than {LONGEST_CAR:g} m"
     return "" if is_fit(entry) else "without a trip that can be driven and is long enough"

@@ -55,12 +55,13 @@ def test_a_trip_that_the_end_would_cut_is_not_drawn(tmp_path: Path, street: Path
     ("routes", "words"),
     [
         ('<trip id="b" type="t" from="ab" to="bc" depart="0"/>', "1 of class bus"),
+        ('<trip id="b" type="l" from="ab" to="bc" depart="0"/>', "1 longer than 7 m"),
         ('<trip id="b" from="nb" to="bs" depart="0"/>', "1 shorter than 300 m"),
         ("", "0 departures .*none at all"),
     ],
 )
 def test_a_scenario_without_a_trip_to_drive_says_why(tmp_path: Path, street: Path, routes: str, words: str) -> None:
-    scenario = traffic(tmp_path, street, '<vType id="t" vClass="bus"/>' + routes, end="30")
+    scenario = traffic(tmp_path, street, '<vType id="t" vClass="bus"/><vType id="l" length="12"/>' + routes, end="30")
     with pytest.raises(ScenarioError, match=f"no trip to drive .*{words}"):
         draw(scenario, 3)
 

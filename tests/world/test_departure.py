@@ -41,9 +41,10 @@ def test_auto_says_when_no_trip_is_fit(tmp_path: Path, street: Path) -> None:
         in_child(job)
 
 
-def test_auto_says_of_what_class_those_are_that_depart(tmp_path: Path, street: Path) -> None:
-    bus = '<vType id="bus" vClass="bus"/><vehicle id="bus" type="bus" depart="60"><route edges="nb bs"/></vehicle>'
-    with pytest.raises(ScenarioError, match=r"between 0 s and .* s; departed: 1 of class bus$"):
+@pytest.mark.parametrize(("kind", "says"), [('vClass="bus"', "of class bus"), ('length="12"', "longer than 7 m")])
+def test_auto_says_what_those_are_that_depart(tmp_path: Path, street: Path, kind: str, says: str) -> None:
+    bus = f'<vType id="bus" {kind}/><vehicle id="bus" type="bus" depart="60"><route edges="nb bs"/></vehicle>'
+    with pytest.raises(ScenarioError, match=rf"between 0 s and .* s; departed: 1 {says}$"):
         entered(scenario_file(tmp_path, street, bus), ego="auto")
 
 
