@@ -80,9 +80,9 @@ def screen(
 ) -> None:
     """Drive trips of a scenario's own traffic with the ADS, and the same trips with SUMO's drivers.
 
-    A trip is drivable when its vehicle is a car (7 m at most), its route is 300 m or longer and can be driven, and
-    SUMO's own driver is over it before the end, and well before an ego's patience is; stops on the way are made by
-    nobody who drives it.
+    A trip is drivable when its vehicle is a car (7 m at most), its route is 300 m or longer (100 m, where there are too
+    few) and can be driven, and SUMO's own driver is over it before the end, and well before an ego's patience is; stops
+    on the way are made by nobody who drives it.
     An interrupted screening goes on where it stopped when it is given the same folder again; of a stack of your own,
     while its Python files are the same.
 

@@ -14,7 +14,7 @@ from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.stack.reference import reference_stack
 from dvca_sumo.world import CARS, LONGEST_CAR, Entry, World
 
-SHORTEST = 300.0  # [m] of a trip
+USUAL, SHORTEST = 300.0, 100.0  # [m] of a trip, and where there are too few so long
 FREE_FLOW, MARGIN = 1.5, 60.0  # so many times its free-flow time and so many seconds, and a trip must be over
 SLOWER = 1.5  # times what SUMO's driver takes, an ego may take
 LONGEST_WINDOW = 7200.0  # [s] of departures that are looked at where nothing says when the scenario ends
@@ -56,7 +56,8 @@ def drawn(scenario: Scenario, count: int) -> Draw:
     `SHORTEST` long and can be driven on the map, and it would be over before the scenario's end, and before an ego's
     patience is: where traffic stands for ever, no driver's way leads anywhere. SUMO's own driver says how long it takes
     (but for one with stops of its own). The draw goes round the time windows; in each the trip is taken that begins
-    and ends where fewest of those taken before do, among equals the first by a draw keyed by the vehicle's name.
+    and ends where fewest of those taken before do, among equals the first by a draw keyed by the vehicle's name. Trips
+    that are not `USUAL` in length are drawn likewise where the others are too few: of one junction, say.
 
     Raises:
         ScenarioError: SUMO refuses the scenario, or no trip is drivable.
@@ -67,16 +68,30 @@ def drawn(scenario: Scenario, count: int) -> Draw:
     trips: list[Trip] = []
     end = math.inf if scenario.end is None else scenario.end
 
-    def is_taken(entry: Entry) -> bool:
-        trip = _trip(entry, departing, durations, end)
-        if isinstance(trip, str):
-            refused[trip] += 1
-            return False
-        trips.append(trip)
-        return True
+    def taken(entries: Sequence[Entry], wanted: int, shortest: float) -> list[Entry]:
+        """Draw so many trips; those that were passed over for nothing but their length."""
+        shorter: list[Entry] = []
+
+        def is_taken(entry: Entry) -> bool:
+            trip = _trip(entry, departing, durations, end)
+            if isinstance(trip, str):
+                refused[trip] += 1
+                return False
+            if trip.length < shortest:
+                shorter.append(entry)
+                return False
+            trips.append(trip)
+            return True
+
+        _spread(_placed(scenario, entries), wanted, is_taken)
+        return shorter
 
     departures = sum(refused.values()) + len(entries)
-    _spread(_placed(scenario, entries), count, is_taken)
+    shorter, usual = taken(entries, count, USUAL), len(trips)
+    taken(shorter, count - usual, SHORTEST)
+    left = len(shorter) - (len(trips) - usual)
+    if left:
+        refused[f"shorter than {USUAL:g} m"] += left
     if not trips:
         reasons = ", ".join(f"{number} {reason}" for reason, number in refused.most_common())
         raise ScenarioError(

@@ -73,7 +73,7 @@ def test_sumos_drivers_are_judged_by_the_same_oracles(tmp_path: Path, street: Pa
         '<trip id="second"', '<trip id="second" type="fast"'
     )
     scenario = traffic(tmp_path, street, fast)
-    results = {one.ego: one for one in in_child(partial(anchored, scenario, draw(scenario, 10).trips, HEAR)).results}
+    results = {one.ego: one for one in in_child(partial(anchored, scenario, draw(scenario, 5).trips, HEAR)).results}
     assert {result.outcome for result in results.values()} == {TripOutcome.ARRIVED}
     assert {(one.violation.kind, one.fault) for one in results["second"].violations} == {("speed_limit", Fault.DRIVER)}
     assert [result.ego for result in results.values() if result.violations] == ["second"]

@@ -3,6 +3,7 @@
 import json
 import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_line import assert_one_error, typed
@@ -144,9 +145,10 @@ def test_trips_after_the_configurations_end_are_driven_where_an_end_after_it_is_
     configured = traffic(tmp_path, street, ROUTES, end="5").configuration.path
     screening = screening_of(load_scenario(configured, AUTO, end=200.0), "small_stacks:full_throttle")
     assert [trip.outcome for trip in screening.sumo_driver] == [TripOutcome.ARRIVED] * 2
-    assert json_of(screening)["scenario"]["end"] == 200.0
-    (told,) = {one["command"].partition("--begin")[2] for one in json_of(screening)["violations"]}
-    assert told == " 0 --end 200 --stack small_stacks:full_throttle"
+    told: Any = json_of(screening)
+    assert told["scenario"]["end"] == 200.0
+    (words,) = {one["command"].partition("--begin")[2] for one in told["violations"]}
+    assert words == " 0 --end 200 --stack small_stacks:full_throttle"
 
 
 @pytest.mark.parametrize(

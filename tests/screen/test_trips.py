@@ -21,12 +21,18 @@ def trip(ego: str, departs: float, expected: float = 60.0) -> Trip:
 
 
 def test_cars_with_a_way_to_go_are_drawn_and_the_others_counted_by_reason(tmp_path: Path, street: Path) -> None:
-    found = draw(traffic(tmp_path, street), 10)
+    found = draw(traffic(tmp_path, street), 5)
     assert [one.ego for one in found.trips] == ["first", "second", "north", "east", "stopping"]
     assert [one.departs for one in found.trips] == sorted(one.departs for one in found.trips)
     assert found.departures == 7
     assert found.refused == {"of class bus": 1, "shorter than 300 m": 1}
     assert all(one.length > 300.0 and one.expected > 15.0 and one.free_flow > 15.0 for one in found.trips)
+
+
+def test_trips_of_a_hundred_metres_are_drawn_where_longer_ones_are_too_few(tmp_path: Path, street: Path) -> None:
+    found = draw(traffic(tmp_path, street), 6)
+    assert [one.ego for one in found.trips] == ["first", "second", "north", "east", "short", "stopping"]
+    assert found.refused == {"of class bus": 1}
 
 
 def test_the_same_seed_draws_the_same_trips_and_another_seed_others(tmp_path: Path, street: Path) -> None:
@@ -47,8 +53,8 @@ def test_trips_are_spread_over_time_and_space(tmp_path: Path, street: Path) -> N
 
 def test_a_trip_that_the_end_would_cut_is_not_drawn(tmp_path: Path, street: Path) -> None:
     found = draw(traffic(tmp_path, street, end="120"), 10)
-    assert 0 < len(found.trips) < 5
-    assert found.refused["not over before the end"] == 5 - len(found.trips)
+    assert 0 < len(found.trips) < 6
+    assert found.refused["not over before the end"] == 6 - len(found.trips)
 
 
 @pytest.mark.parametrize(
@@ -56,7 +62,7 @@ def test_a_trip_that_the_end_would_cut_is_not_drawn(tmp_path: Path, street: Path
     [
         ('<trip id="b" type="t" from="ab" to="bc" depart="0"/>', "1 of class bus"),
         ('<trip id="b" type="l" from="ab" to="bc" depart="0"/>', "1 longer than 7 m"),
-        ('<trip id="b" from="nb" to="bs" depart="0"/>', "1 shorter than 300 m"),
+        ('<trip id="b" from="nb" to="bs" depart="0" departPos="last" arrivalPos="40"/>', "1 shorter than 100 m"),
         ("", "0 departures .*none at all"),
     ],
 )
