@@ -227,10 +227,16 @@ def test_ego_does_not_start_while_a_person_walks_up_to_its_front_corner(x: float
     assert driven.fronts[-1] > 120.0
 
 
-@pytest.mark.parametrize("x", [103.5, 102.5, 101.5])
-def test_ego_does_not_start_while_a_person_walks_along_its_side_and_into_it(x: float) -> None:
+@pytest.mark.parametrize(
+    ("x", "y", "heading"),
+    [
+        *((x, -1.75, math.pi - 0.2) for x in (103.5, 102.5, 101.5)),
+        *((x, -1.90, math.pi - 0.1) for x in (103.5, 102.5)),  # by it, at 0.3 m
+    ],
+)
+def test_ego_does_not_start_while_a_person_walks_along_its_side_and_into_it(x: float, y: float, heading: float) -> None:
     """Standing, it is walked into; moving, it would be the one that touches the person."""
-    walker = person(3, x, -1.75, heading=math.pi - 0.2, speed=1.2)
+    walker = person(3, x, y, heading=heading, speed=1.2)
     driven = drive(road(), 12.0, station=100.0, actors=[walker])
     is_alongside = driven.states[:, 0] < (x - 99.1) / 1.2
     assert driven.speeds[is_alongside].max() == 0.0
