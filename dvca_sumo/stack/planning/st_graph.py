@@ -258,9 +258,16 @@ def _leads(row: int, graph: Graph, lanes: frozenset[str], shape: VehicleShape, c
     if is_beside or abs(futures.directions[row, first]) < ALONG or not (is_there or is_in_lane):
         return False
     if futures.stations[row, 0] > shape.centre:
-        return bool(is_there)
+        return bool(is_there) and not _leaves_oncoming(row, graph, shape)
     is_crossing = not is_in_lane or (not lanes.issuperset(scene.lanes[row]) and graph.is_off_lane(row, shape.width))
     return False if is_crossing else None
+
+
+def _leaves_oncoming(row: int, graph: Graph, shape: VehicleShape) -> bool:
+    """Whether future `row`, on the path, comes towards the ego and is off it again before it is there."""
+    last = graph.last[row]
+    is_oncoming = graph.scene.futures.directions[row, graph.first[row]] < 0.0
+    return bool(is_oncoming and last + 1 < graph.occupied.shape[1] and graph.low[row, last + 1] > shape.front)
 
 
 def leader_of(rows: list[int], graph: Graph, shape: VehicleShape) -> Leader | None:

@@ -52,6 +52,17 @@ def test_who_comes_only_after_the_ego_is_back_in_its_lane_is_not_waited_for() ->
     assert driven.speeds.min() > 7.0
 
 
+@pytest.mark.parametrize("x", [70.0, 80.0, 90.0])
+@pytest.mark.parametrize(("y", "aside"), [(-0.5, 0.3), (-0.5, 0.15), (0.5, -0.3), (-3.0, 0.3)])
+def test_who_comes_aslant_across_the_way_and_is_off_it_in_time_is_not_stopped_for(
+    x: float, y: float, aside: float
+) -> None:
+    bus = car(5, x, y, heading=math.pi - aside, speed=14.0, size=(10.0, 2.5))
+    driven = drive(road(), 8.0, station=20.0, speed=13.0, actors=[bus])
+    assert driven.speeds.min() > 8.0
+    assert driven.clearances.min() > 0.5
+
+
 def test_people_who_walk_towards_the_ego_beside_its_way_are_met_there() -> None:
     driven = drive(swerving(1.0), 40.0, speed=8.0, actors=[person(5, 150.0, 3.05, heading=math.pi, speed=1.4)])
     assert driven.fronts[-1] > 200.0
