@@ -12,7 +12,7 @@ from dvca_sumo.roadmap import RouteError
 from dvca_sumo.run import Departing, free_flow, opened
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.stack.reference import reference_stack
-from dvca_sumo.world import CARS, LONGEST_CAR, Entry, World
+from dvca_sumo.world import Entry, World
 
 USUAL, SHORTEST = 300.0, 100.0  # [m] of a trip, and where there are too few so long
 FREE_FLOW, MARGIN = 1.5, 60.0  # so many times its free-flow time and so many seconds, and a trip must be over
@@ -111,13 +111,11 @@ def _departures(
     while world.time < end and not world.is_exhausted:
         world.advance()
         for name in world.departed():
-            vehicle_class = world.class_of(name)
-            if vehicle_class not in CARS:
-                refused[f"of class {vehicle_class}"] += 1
+            entry = departing.entry(name, world)
+            if entry.why_no_car:
+                refused[entry.why_no_car] += 1
             elif not departing.definitions.has(name):
                 refused["not named in the scenario's files"] += 1
-            elif (entry := departing.entry(name, world)).length > LONGEST_CAR:
-                refused[f"longer than {LONGEST_CAR:g} m"] += 1
             else:
                 entries[name] = entry
         for name in world.arrived():

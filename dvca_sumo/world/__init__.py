@@ -14,24 +14,11 @@ from dvca_sumo.world.obstacles import joined
 from dvca_sumo.world.session import Session
 from dvca_sumo.world.vehicle import ControlCommandError, Vehicle, VehicleLimits
 
-__all__ = [
-    "CARS",
-    "LONGEST_CAR",
-    "ControlCommandError",
-    "Ego",
-    "Entry",
-    "Native",
-    "Vehicle",
-    "VehicleLimits",
-    "World",
-    "shape_of",
-]
+__all__ = ["ControlCommandError", "Ego", "Entry", "Native", "Vehicle", "VehicleLimits", "World", "shape_of"]
 
 RADIUS = 150.0  # [m] around an ego within which other bodies are observed; beyond every sensor's range
 AUTO_DELAY = 60.0  # [s] after the begin, so that a chosen ego meets traffic
 LONGEST_DELAY = 600.0  # [s] beyond its departure time an ego's road will not clear any more
-CARS = ("passenger", "private", "taxi", "evehicle")  # vehicle classes that are driven like a car
-LONGEST_CAR = 7.0  # [m]; a type without a class, of a bus say, is of the class of cars
 
 
 class World:
@@ -82,10 +69,10 @@ class World:
                     unfit[f"before {earliest:g} s"] += 1
                 elif wanted == AUTO:
                     entry = self._session.entry(name, settings)
-                    objection = _objection(entry, is_fit)
-                    if not objection:
+                    objection = entry.why_no_car
+                    if not objection and is_fit(entry):
                         return entry
-                    unfit[objection] += 1
+                    unfit[objection or "without a trip that can be driven and is long enough"] += 1
         whom = "no vehicle fit to be the ego" if wanted == AUTO else f"the ego {wanted!r} never"
         them = ", ".join(f"{count} {how}" for how, count in sorted(unfit.items())) or "none"
         others = f"; departed: {them}" if wanted == AUTO else ""
@@ -98,10 +85,6 @@ class World:
     def arrived(self) -> tuple[str, ...]:
         """Vehicles that SUMO removed at the end of their trips in the last step."""
         return self._session.arrived()
-
-    def class_of(self, vehicle: str) -> str:
-        """The class of a vehicle that is under way."""
-        return self._session.class_of(vehicle)
 
     def is_stopping(self, vehicle: str) -> bool:
         """Whether a vehicle that is under way makes a stop of its own now, parks or waits for somebody."""
@@ -179,12 +162,3 @@ class World:
     def close(self) -> None:
         """End the simulation."""
         self._session.close()
-
-
-def _objection(entry: Entry, is_fit: Callable[[Entry], bool]) -> str:
-    """Why `auto` does not choose a vehicle; empty if it does."""
-    if entry.vehicle_class not in CARS:
-        return f"of class {entry.vehicle_class}"
-    if entry.length > LONGEST_CAR:
-        return f"longer than {LONGEST_CAR:g} m"
-    return "" if is_fit(entry) else "without a trip that can be driven and is long enough"

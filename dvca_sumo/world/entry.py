@@ -12,6 +12,8 @@ from dvca_sumo.truth import EgoTruth
 
 _SIDEWAYS, _BRAKING = 2.0, 2.0  # [m/s^2] in curves and before them, of careful drivers
 _STRAIGHT = 1e-4  # [1/m]
+_CARS = ("passenger", "private", "taxi", "evehicle")  # vehicle classes that are driven like a car
+_LONGEST_CAR = 7.0  # [m]; a type without a class, of a bus say, is of the class of cars
 
 
 class Entry(msgspec.Struct, frozen=True):
@@ -32,6 +34,13 @@ class Entry(msgspec.Struct, frozen=True):
     beside: float  # [m] and to the left of its centre
     stops: tuple[str, ...]  # its own, by stopping place or lane and position; as an ego it does not make them
     parameters: dict[str, str]  # the vehicle's own "dvca." parameters, without that prefix
+
+    @property
+    def why_no_car(self) -> str:
+        """Why the vehicle is none that is driven like a car; empty if it is."""
+        if self.vehicle_class not in _CARS:
+            return f"of class {self.vehicle_class}"
+        return f"longer than {_LONGEST_CAR:g} m" if self.length > _LONGEST_CAR else ""
 
 
 def departure(entry: Entry, route: Route, shape: VehicleShape) -> EgoTruth:

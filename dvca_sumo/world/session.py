@@ -245,10 +245,6 @@ class Session:
             parameters={name: text for name, text in texts.items() if text},
         )
 
-    def class_of(self, vehicle: str) -> str:
-        """The class of a vehicle that is in the simulation."""
-        return str(libsumo.vehicle.getVehicleClass(vehicle))
-
     def is_stopping(self, vehicle: str) -> bool:
         """Whether a vehicle that is in the simulation makes a stop of its own."""
         return bool(libsumo.vehicle.isStopped(vehicle))
