@@ -21,7 +21,6 @@ from dvca_sumo.engine.replay import roadmap
 from dvca_sumo.run import Departing, Simulation, Task, opened
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.stack.reference import StackError, reference_stack
-from dvca_sumo.world import CARS
 
 SLOWEST = 0.5  # of real time
 
@@ -45,9 +44,11 @@ def measured(scenario: Scenario, egos: int, window: float, seconds: float) -> Co
             simulation.cycle()
             simulation.advance()
             for name in world.departed():
-                if not left or world.time < scenario.begin + window or world.class_of(name) not in CARS:
+                if not left or world.time < scenario.begin + window:
                     continue
                 entry = departing.entry(name, world)
+                if entry.why_no_car:
+                    continue
                 try:
                     drive = departing.drive(
                         entry, Task(msgspec.structs.replace(scenario, ego=name)), world, is_whole=False
