@@ -26,6 +26,7 @@ class PerceptionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     radial_speed_sigma: float = 0.1  # [m/s]
     gate: float = 13.8  # squared Mahalanobis distance of the worst match (chi2, 2 dof, 99.9 %)
     class_penalty: float = 4.0  # added to the squared distance where track and detection differ in class
+    stride: float = 0.75  # [m] that people may be beside where they are expected
     confirming_hits: int = 2  # hits that confirm a track ...
     confirming_sweeps: int = 3  # ... within its first sweeps; else it is dropped
     coast_time: float = 0.8  # [s] a confirmed track lives on without being seen
@@ -82,7 +83,9 @@ class Tracker:
         """Correct the tracks that were seen; start tracks of what was not known."""
         rows, matches = mutual_nearest(self._costs(found), self._config.gate)
         if rows.size < min(self._tracks.ids.size, found.classes.size):
-            rows, matches = self._with_those_in_place(rows, matches, found)
+            displaced, seen = self._displaced(rows, matches, found)
+            self._tracks.displace(displaced, found.boxes[seen, :2])
+            rows, matches = np.concatenate((rows, displaced)), np.concatenate((matches, seen))
         if rows.size:
             self._tracks.update(rows, _selected(found, matches), time)
         if matches.size < found.classes.size:
@@ -98,18 +101,19 @@ class Tracker:
         costs: Floats = (dx * dx + dy * dy) / (own[:, None] + found.variances) + self._config.class_penalty * differs
         return costs
 
-    def _with_those_in_place(self, rows: Integers, matches: Integers, found: Measurements) -> tuple[Integers, Integers]:
-        """The pairs, and of the rest those in which a track's place is within half the width of what was found.
+    def _displaced(self, rows: Integers, matches: Integers, found: Measurements) -> tuple[Integers, Integers]:
+        """Of the tracks and measurements left by the pairs, those within half the width of what was found, or a stride.
 
-        Two bodies cannot be in one place: it has moved as it is not expected to, and would go on as two.
+        What is gone from one place, and there so near to it, has moved as it is not expected to, and would go on as
+        two.
         """
         tracks = self._tracks
         lost, new = _others(rows, tracks.ids.size), _others(matches, found.classes.size)
         dx = tracks.means[lost, 0, None] - found.boxes[new, 0]
         dy = tracks.means[lost, 1, None] - found.boxes[new, 1]
-        half_widths = 0.5 * found.boxes[new, 4]
-        again, seen = mutual_nearest((dx * dx + dy * dy) / (half_widths * half_widths), 1.0)
-        return np.concatenate((rows, lost[again])), np.concatenate((matches, new[seen]))
+        reaches = np.maximum(0.5 * found.boxes[new, 4], self._config.stride)
+        again, seen = mutual_nearest((dx * dx + dy * dy) / (reaches * reaches), 1.0)
+        return lost[again], new[seen]
 
     def _live_and_die(self, time: float) -> Flags:
         """Drop what was lost or never confirmed; of the rest, which are confirmed."""

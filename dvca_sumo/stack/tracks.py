@@ -83,6 +83,12 @@ class Tracks:
         self._update_forms(rows, found, speeds)
         self._update_motion(rows, found, means, speeds)
 
+    def displace(self, rows: Integers, places: Floats) -> None:
+        """Move tracks to `places` (k, 2) [m], their velocities as they were: a step aside is no speed."""
+        means = self.means.copy()
+        means[rows, :2] = places
+        self.means = means
+
     def _update_motion(self, rows: Integers, found: Measurements, means: Floats, speeds: Floats) -> None:
         """Kalman update by position, radial speed and, for what rolls, no velocity across the heading."""
         count = len(rows)

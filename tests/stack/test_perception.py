@@ -111,6 +111,25 @@ def test_a_car_that_slides_farther_than_any_car_is_taken_to_does_not_become_two(
     assert messages[-1].boxes[0, 1] == pytest.approx(0.06 * 29, abs=0.9)
 
 
+def test_who_steps_aside_is_there_at_once_and_has_no_speed_from_it() -> None:
+    scenes = [[walker(15 - 0.14 * k, 0.6 * (k >= 20), -1.4)] for k in range(30)]
+    messages = tracked(scenes)
+    assert ids(messages[1:]) == [[1]] * 29
+    for k, message in enumerate(messages[20:], start=20):
+        npt.assert_allclose(message.boxes[0, :2], (15 - 0.14 * k, 0.6), atol=0.02)
+        npt.assert_allclose(message.velocities[0], (-1.4, 0.0), atol=0.1)
+
+
+def test_who_comes_up_a_stride_beside_another_who_is_still_seen_is_another() -> None:
+    scenes = [[walker(15, 0)]] * 5 + [[walker(15, 0), walker(15, 0.7)]] * 5
+    assert tracked(scenes)[-1].ids.tolist() == [1, 2]
+
+
+def test_who_comes_up_farther_than_a_stride_from_one_who_is_gone_is_another() -> None:
+    messages = tracked([[walker(15, 0)]] * 5 + [[walker(15, 0.9)]] * 10)
+    assert messages[-1].ids.tolist() == [2]
+
+
 def test_pedestrians_who_cross_each_others_way_keep_their_ids() -> None:
     scenes = [[walker(15, -3 + 0.14 * k, 0, 1.4), walker(15.6, 3 - 0.14 * k, 0, -1.4)] for k in range(43)]
     messages = tracked(scenes)
