@@ -26,7 +26,7 @@ class PerceptionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     radial_speed_sigma: float = 0.1  # [m/s]
     gate: float = 13.8  # squared Mahalanobis distance of the worst match (chi2, 2 dof, 99.9 %)
     class_penalty: float = 4.0  # added to the squared distance where track and detection differ in class
-    stride: float = 0.75  # [m] that people may be beside where they are expected
+    stride: float = 0.75  # [m] that a body, however narrow, may be from where it is expected: people step aside
     confirming_hits: int = 2  # hits that confirm a track ...
     confirming_sweeps: int = 3  # ... within its first sweeps; else it is dropped
     coast_time: float = 0.8  # [s] a confirmed track lives on without being seen
