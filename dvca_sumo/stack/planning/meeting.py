@@ -75,6 +75,8 @@ class Meetings:
         if margin < config.pass_margin and self._passes([row], graph, profile, margin)[0]:
             return None
         stop = self._stop(row, graph, views if others_first else [])
+        if self._moves_up(row, stop, graph, profile):
+            stop = msgspec.structs.replace(stop, at=0.0, give=stop.at + stop.give)
         room = stop.at + stop.give
         if room <= -HARD_GAP - self._beside(row, entry, graph, profile):  # stopping there would not help
             return None
@@ -98,6 +100,15 @@ class Meetings:
             and graph.low[other][graph.occupied[other]].min() < front
         ]
         return bool(likelier and self._passes(likelier, graph, profile, 0.0).any())
+
+    def _moves_up(self, row: int, stop: Stop, graph: Graph, profile: Profile) -> bool:
+        """Whether the ego would set off to stop again closer to a vehicle that slows down in its way.
+
+        That one may have slowed for the ego itself, and drive on: then the place to let it pass is here.
+        """
+        scene, at_rest = graph.scene, self._config.standing_speed
+        is_slowing = stop.until == math.inf and scene.speeds[scene.owners[row]] > at_rest and not scene.is_person[row]
+        return bool(is_slowing and profile.speeds[0] < at_rest and 0.0 < stop.at < self._shape.length)
 
     def _beside(self, row: int, entry: float, graph: Graph, profile: Profile) -> float:
         """How far behind the front bumper somebody may come to the ego's way, at `entry` [s], and standing helps [m].

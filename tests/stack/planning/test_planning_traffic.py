@@ -404,6 +404,20 @@ def test_ego_that_stands_in_a_left_turn_stays_there_while_a_bus_passes_close_bef
 
 
 @pytest.mark.parametrize(
+    ("radius", "y", "heading"), [(12.0, 3.2, 0.1), (12.0, 4.0, 0.1), (12.0, 4.0, 0.26), (14.0, 3.2, 0.26)]
+)
+def test_ego_that_stands_in_a_left_turn_stays_there_while_who_comes_slows_down_in_its_way(
+    radius: float, y: float, heading: float
+) -> None:
+    """That one may do so for the ego, and drive on."""
+    junction = stop_line(101.0, Control.YIELD, exit_station=126.0)
+    oncoming = car(3, 122.0, y, heading=math.pi + heading, speed=5.0, braking=2.0, lanes=("major_0",))
+    driven = drive(road(curve_points(radius), stop_lines=[junction]), 2.2, station=106.0, actors=[oncoming])
+    assert oncoming.speed_at(2.2) > 0.5
+    assert math.dist(driven.states[0, 1:3], driven.states[-1, 1:3]) < 0.02
+
+
+@pytest.mark.parametrize(
     ("radius", "speed", "oncoming", "distance"),
     [(14.0, 3.0, 10.0, 60.0), (20.0, 6.0, 14.0, 45.0), (26.0, 6.0, 10.0, 60.0)],
 )
