@@ -14,6 +14,7 @@ import sumolib
 from sumolib.net.lane import SUMO_VEHICLE_CLASSES
 
 from dvca_sumo.geometry.polyline import Floats, Polyline
+from dvca_sumo.roadmap.conflicts import drawn_foes
 from dvca_sumo.roadmap.lanes import Junction, Lane, Movement, RoadMapError
 
 _ROAD = ("", "internal")  # edge functions with traffic along them
@@ -46,7 +47,8 @@ def read_net(path: Path, vehicle_class: str) -> NetContents:
     vias, groups = _vias(edges), _signal_groups(net)
     walking = _walking_areas(net)
     junctions = {
-        node.getID(): _junction(node, vias, groups, walking[node.getID()], vehicle_class) for node in net.getNodes()
+        node.getID(): _junction(node, lanes, vias, groups, walking[node.getID()], vehicle_class)
+        for node in net.getNodes()
     }
     return NetContents(
         lanes=lanes,
@@ -175,16 +177,25 @@ def _walking_areas(net: Any) -> dict[str, dict[str, Any]]:
 
 
 def _junction(
-    node: Any, vias: dict[str, str], groups: dict[str, str], walking: dict[str, Any], vehicle_class: str
+    node: Any,
+    lanes: dict[str, Lane],
+    vias: dict[str, str],
+    groups: dict[str, str],
+    walking: dict[str, Any],
+    vehicle_class: str,
 ) -> Junction:
     crossings = (edge for edge in node.getIncoming() if edge.getFunction() == "crossing")
+    movements = tuple(
+        _movement(connection, index, vias, groups, vehicle_class) for index, connection in enumerate(_links(node))
+    )
+    foes, responses = dict(node._foes), dict(node._prohibits)  # noqa: SLF001 no accessor
+    if node.getType() == "unregulated":  # nobody has to wait there, so nobody may count on it
+        foes = responses = drawn_foes(movements, lanes)
     return Junction(
         id=node.getID(),
-        movements=tuple(
-            _movement(connection, index, vias, groups, vehicle_class) for index, connection in enumerate(_links(node))
-        ),
-        foes=dict(node._foes),  # noqa: SLF001 no accessor
-        responses=dict(node._prohibits),  # noqa: SLF001 no accessor
+        movements=movements,
+        foes=foes,
+        responses=responses,
         crossings=tuple(lane_id for edge in crossings for lane_id in _lane_ids(edge)),
         outline=tuple((x, y) for x, y, *_ in node.getShape()),
         walking={lane: tuple((x, y) for x, y, *_ in shape) for lane, shape in walking.items()},

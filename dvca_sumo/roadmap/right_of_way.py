@@ -24,14 +24,16 @@ def stop_line(net: NetContents, movement: Movement, line: Polyline, station: flo
     """The stop line before `movement`, which the route drives between two stations of its `line` [m]."""
     junction = net.junctions[movement.junction]
     x, y = net.lanes[movement.from_lane].line.points[-1]
-    control = Control.SIGNAL if movement.signal_id else _CONTROLS.get(movement.state, Control.PRIORITY)
+    yields_to = junction.prior(movement)
+    otherwise = Control.YIELD if yields_to else Control.PRIORITY
+    control = Control.SIGNAL if movement.signal_id else _CONTROLS.get(movement.state, otherwise)
     return StopLine(
         station=station,
         lane=movement.from_lane,
         control=control,
         signal_id=movement.signal_id,
         position=(float(x), float(y)),
-        yields_to=junction.prior(movement),
+        yields_to=yields_to,
         crosses=junction.conflicting(movement),
         exit_station=exit_station,
         stop_signs=_stop_signs(net, movement) if control in STOP_SIGNS else (),

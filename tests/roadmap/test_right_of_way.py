@@ -56,6 +56,21 @@ def test_left_turn_off_the_main_road_yields_to_oncoming_traffic(plain: NetBuilde
     assert approaches(line.yields_to) == {"wx_0"}
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "others"),
+    [("wx", "xe", {"sx_0", "ex_0"}), ("wx", "xs", {"ex_0"}), ("ex", "xw", {"sx_0"}), ("sx", "xe", {"wx_0"})],
+)
+def test_where_a_junction_is_unregulated_the_ego_gives_way_to_all_whose_way_meets_its_own(
+    plain: NetBuilder, before: str, after: str, others: set[str]
+) -> None:
+    ways = ("wx xe", "wx xs", "ex xw", "ex xs", "sx xe", "sx xw")
+    connections = "".join('<connection from="{}" to="{}"/>'.format(*way.split()) for way in ways)
+    line = first_line(plain(NODES.format("unregulated"), EDGES, connections), before, after)
+    assert line.control is Control.YIELD
+    assert approaches(line.yields_to) == others
+    assert line.crosses == line.yields_to
+
+
 def test_internal_lanes_of_a_waiting_left_turn_are_all_foes(plain: NetBuilder) -> None:
     roadmap = tee(plain, "priority")
     route = roadmap.route(["ex", "xs"], "ex_0", 10.0, None, 100.0)
@@ -71,7 +86,7 @@ def test_internal_lanes_of_a_waiting_left_turn_are_all_foes(plain: NetBuilder) -
         ("allway_stop", Control.ALL_WAY_STOP),
         ("right_before_left", Control.RIGHT_BEFORE_LEFT),
         ("zipper", Control.YIELD),
-        ("unregulated", Control.PRIORITY),
+        ("unregulated", Control.YIELD),
     ],
 )
 def test_sign_at_the_side_road(plain: NetBuilder, kind: str, control: Control) -> None:
