@@ -16,7 +16,7 @@ from dvca_sumo.scenario import Scenario
 from dvca_sumo.screen.driving import Driven, Heard
 from dvca_sumo.screen.neighbours import Neighbourhood
 from dvca_sumo.screen.queues import Queues
-from dvca_sumo.screen.results import TripOutcome, TripResult, Watch
+from dvca_sumo.screen.results import TripOutcome, TripResult, Watch, cut_off
 from dvca_sumo.screen.trips import Trip
 from dvca_sumo.stack.reference import reference_stack
 from dvca_sumo.truth import Moment
@@ -58,7 +58,7 @@ def anchored(scenario: Scenario, trips: Sequence[Trip], hear: Heard) -> Driven:
                     rides.remove(ride)
                     results.append(result)
             hear(world.time, len(results))
-        results += [ride.cut() for ride in rides]
+        results += [ride.cut(world.time) for ride in rides]
     results += [TripResult(name, TripOutcome.NOT_DRIVEN, "it did not depart") for name in sorted(awaited)]
     return Driven(tuple(results), neighbourhood.seen())
 
@@ -92,9 +92,9 @@ class _Ride:
             self._watch.touch(moment)
         return self._result(TripOutcome.TIME_OVER) if moment.time >= self._latest else None
 
-    def cut(self) -> TripResult:
+    def cut(self, time: float) -> TripResult:
         """Its result, when the simulation ends before it."""
-        return self._result(TripOutcome.TIME_OVER)
+        return self._result(TripOutcome.CUT, cut_off(time))
 
     def _has_touched(self, moment: Moment) -> bool:
         found = [oracle.observe(moment) for oracle in self._oracles]

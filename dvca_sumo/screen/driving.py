@@ -1,16 +1,17 @@
 """Trips driven by the ADS, several at once in one simulation."""
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
 import msgspec
 
 from dvca_sumo.engine.replay import roadmap
-from dvca_sumo.run import Departing, Drive, Over, Simulation, Task, built_here, opened
+from dvca_sumo.run import Departing, Drive, Over, Simulation, StopRule, Task, built_here, opened
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.screen.neighbours import Neighbourhood, Neighbours
 from dvca_sumo.screen.queues import Queues
-from dvca_sumo.screen.results import TripOutcome, TripResult, Watch
+from dvca_sumo.screen.results import TripOutcome, TripResult, Watch, cut_off
 from dvca_sumo.screen.trips import SLOWER, Trip
 from dvca_sumo.stack.reference import StackError
 from dvca_sumo.stack.sources import StackSource, stack_factory
@@ -46,13 +47,15 @@ def planned(trips: Sequence[Trip], concurrent: int) -> list[list[Trip]]:
 def driven(scenario: Scenario, source: StackSource, trips: Sequence[Trip], concurrent: int, hear: Heard) -> Driven:
     """Drive trips in one simulation, in this process; alone, a trip is driven as `rtest` drives it.
 
-    A trip that cannot be driven, and one whose stack fails, has a result that says why.
+    A trip that cannot be driven, and one whose stack fails, has a result that says why. One that the scenario's end
+    cuts off before the ego's patience is over did not fail to arrive in time, as it has for `rtest`: nobody knows.
 
     Raises:
         ScenarioError: SUMO refuses the scenario, or gave up.
     """
     factory = built_here(stack_factory(source))
-    departing = Departing(scenario, partial(roadmap, scenario.configuration.net), factory)
+    endless = msgspec.structs.replace(scenario, end=None)  # its end leaves an ego's patience as long as it is
+    departing = Departing(endless, partial(roadmap, scenario.configuration.net), factory)
     with opened(scenario) as world:
         return _Fleet(scenario, departing, world, trips, concurrent).proceed(hear)
 
@@ -69,6 +72,7 @@ class _Fleet:
         self._simulation = Simulation(world, scenario.begin)
         self._awaited = {trip.ego: trip for trip in trips}
         self._concurrent = concurrent
+        self._stop = StopRule(at=math.inf if scenario.end is None else scenario.end)
         self._watches: dict[str, Watch] = {}  # by ego
         self._results: list[TripResult] = []
         self._crowded_out: list[str] = []
@@ -98,7 +102,7 @@ class _Fleet:
                 self._crowded_out.append(name)
                 continue
             entry = self._departing.entry(name, self._world)
-            task = Task(msgspec.structs.replace(self._scenario, ego=name))
+            task = Task(msgspec.structs.replace(self._scenario, ego=name), stop=self._stop)
             try:
                 drive = self._departing.drive(entry, task, self._world, is_whole=False)
             except (ScenarioError, StackError) as error:
@@ -120,11 +124,12 @@ class _Fleet:
         for drive, error in over:
             outcome = drive.outcome
             watch = self._watches.pop(drive.ego.name)
-            how = TripOutcome.CONTACT
+            how, reason = TripOutcome(outcome.ending.value), ""
             if error is not None:
-                how = TripOutcome.ABORTED
-            elif outcome.ending is not Ending.CUT:
-                how = TripOutcome(outcome.ending.value)
-            reason = "" if error is None else str(error)
+                how, reason = TripOutcome.ABORTED, str(error)
+            elif any(violation.contact is not None for violation in outcome.violations):
+                how = TripOutcome.CONTACT
+            elif outcome.ending is Ending.CUT:
+                reason = cut_off(self._world.time)
             jam = next((name for name in watch.holding() if not self._world.is_stopping(name)), None)
             self._results.append(watch.result(how, outcome.judgements, reason, outcome.digest, jam))

@@ -20,6 +20,7 @@ class TripOutcome(enum.StrEnum):
     ARRIVED = "arrived"
     TIME_OVER = "time_over"  # of its patience, or no progress
     CONTACT = "contact"
+    CUT = "cut"  # the scenario ended before its patience did: what would have come of it is not known
     ABORTED = "aborted"  # the stack failed, or SUMO took the vehicle away
     NOT_DRIVEN = "not_driven"
 
@@ -29,7 +30,7 @@ class TripResult(msgspec.Struct, frozen=True):
 
     ego: str
     outcome: TripOutcome
-    reason: str = ""  # of ABORTED and NOT_DRIVEN
+    reason: str = ""  # of CUT, ABORTED and NOT_DRIVEN
     start: float = 0.0  # [s] of its departure
     distance: float = 0.0  # [m]
     duration: float = 0.0  # [s]
@@ -39,6 +40,11 @@ class TripResult(msgspec.Struct, frozen=True):
     violations: tuple[Judged, ...] = ()
     unknown: tuple[str, ...] = ()  # oracles that could not tell
     digest: str = ""  # of an ego's run, as in the result of `run`
+
+
+def cut_off(end: float) -> str:
+    """Why a trip is CUT."""
+    return f"the scenario ended at {end:g} s"
 
 
 class Watch:

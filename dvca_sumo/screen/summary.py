@@ -53,6 +53,7 @@ class DriverSummary(msgspec.Struct, frozen=True):
     trips: int  # that were driven
     not_driven: int
     ended_by_simulator: int  # by a contact of its doing: counted apart
+    cut: int  # by the scenario's end, before their patience was over: likewise
     completed: Share  # of the others
     km: float
     hours: float
@@ -84,12 +85,14 @@ def summary_of(results: Sequence[TripResult], like: Sequence[TripResult], neighb
         if trip.outcome is TripOutcome.ARRIVED and reference.get(trip.ego, 0.0) > 0.0
     ]
     ended = sum(_is_ended_by_simulator(trip) for trip in trips)
+    cut = sum(trip.outcome is TripOutcome.CUT for trip in trips)
     nearest = [trip.least_ttc for trip in trips if trip.least_ttc is not None]
     return DriverSummary(
         trips=len(trips),
         not_driven=len(results) - len(trips),
         ended_by_simulator=ended,
-        completed=share_of(sum(trip.outcome is TripOutcome.ARRIVED for trip in trips), len(trips) - ended),
+        cut=cut,
+        completed=share_of(sum(trip.outcome is TripOutcome.ARRIVED for trip in trips), len(trips) - ended - cut),
         km=km,
         hours=sum(trip.duration for trip in trips) / 3600.0,
         outcomes=dict(Counter(trip.outcome.value for trip in results)),

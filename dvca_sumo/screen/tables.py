@@ -55,8 +55,9 @@ def has_failed(screening: Screening) -> bool:
 
 
 def has_gaps(screening: Screening) -> bool:
-    """Whether a trip could not be driven."""
-    return any(trip.outcome in (TripOutcome.NOT_DRIVEN, TripOutcome.ABORTED) for trip in screening.ads)
+    """Whether a trip could not be driven, or not to its end."""
+    untold = (TripOutcome.NOT_DRIVEN, TripOutcome.ABORTED, TripOutcome.CUT)
+    return any(trip.outcome in untold for trip in screening.ads)
 
 
 def terminal_text(screening: Screening) -> str:
@@ -165,6 +166,7 @@ def _range(values: Quartiles) -> str:
 _ROWS: Sequence[tuple[str, Callable[[DriverSummary], str]]] = (
     ("trips driven", lambda one: str(one.trips)),
     ("ended by the simulator", lambda one: str(one.ended_by_simulator)),
+    ("cut by the scenario's end", lambda one: str(one.cut)),
     ("completed, of the others", lambda one: _share(one.completed)),
     ("km", lambda one: f"{one.km:.1f}"),
     ("at-fault collisions", lambda one: str(one.at_fault_collisions)),

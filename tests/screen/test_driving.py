@@ -145,6 +145,31 @@ def test_time_in_a_queue_is_what_the_ego_loses_behind_slow_ones(
         assert result.held == native.held == held
 
 
+@pytest.mark.parametrize(("end", "outcome"), [("100", TripOutcome.CUT), ("300", TripOutcome.TIME_OVER)])
+def test_what_comes_of_a_trip_is_not_known_where_the_scenario_ends_before_its_patience(
+    tmp_path: Path, plain_file: Callable[..., Path], end: str, outcome: TripOutcome
+) -> None:
+    net = plain_file(
+        '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/>', '<edge id="we" from="w" to="e" speed="13.9"/>'
+    )
+    routes = (
+        '<vType id="slow" maxSpeed="1"/><vehicle id="other" type="slow" depart="0" departPos="95">'
+        '<route edges="we"/></vehicle><trip id="ego" from="we" to="we" depart="1"/>'
+    )
+    scenario = traffic(tmp_path, net, routes, end=end)
+    trips = [Trip("ego", 1.0, 395.0, 29.0, 400.0)]
+    (result,) = in_child(partial(driven, scenario, StackSource(), trips, 1, HEAR)).results
+    (native,) = in_child(partial(anchored, scenario, trips, HEAR)).results
+    assert native.outcome is TripOutcome.CUT  # SUMO's drivers have more patience
+    assert result.outcome is outcome
+    if outcome is TripOutcome.CUT:
+        assert "destination" in result.unknown
+        assert result.violations == ()
+        assert result.reason == native.reason == "the scenario ended at 100 s"
+    else:
+        assert [one.violation.kind for one in result.violations] == ["destination_not_reached"]
+
+
 def test_an_ego_is_not_held_up_by_a_queue_that_another_ego_heads(
     tmp_path: Path, plain_file: Callable[..., Path]
 ) -> None:

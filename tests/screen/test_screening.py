@@ -5,6 +5,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from command_line import assert_one_error, typed
 from screen_scenes import traffic
@@ -122,14 +123,23 @@ def test_each_violation_comes_with_a_command_that_reproduces_it(
     assert chosen["command"] in terminal_text(reckless)
 
 
-def test_a_trip_that_the_simulator_ended_is_counted_apart() -> None:
+def test_trips_that_the_simulator_ended_or_the_scenario_cut_off_are_counted_apart() -> None:
     contact = Violation("collision", Category.SAFETY, 5.0, "x", (0.0, 0.0), "ab_0", 0.0, 0.0, "", Contact.ACTIVE_FRONT)
-    trips = [TripResult("arrived", TripOutcome.ARRIVED)]
+    trips = [TripResult("arrived", TripOutcome.ARRIVED), TripResult("cut", TripOutcome.CUT)]
     trips += [
         TripResult(fault, TripOutcome.CONTACT, violations=(Judged("collision", contact, fault, ""),)) for fault in Fault
     ]
     found = summary_of(trips, [], Neighbours(0.0, 0, 0))
-    assert (found.trips, found.ended_by_simulator, found.completed.count, found.completed.total) == (4, 1, 1, 3)
+    assert (found.trips, found.ended_by_simulator, found.cut) == (5, 1, 1)
+    assert (found.completed.count, found.completed.total) == (1, 3)
+
+
+def test_a_trip_that_was_cut_off_is_a_gap_and_the_text_says_why(reckless: Screening) -> None:
+    assert not has_gaps(reckless)
+    cut = msgspec.structs.replace(reckless.ads[0], outcome=TripOutcome.CUT, reason="the scenario ended at 100 s")
+    screening = msgspec.structs.replace(reckless, ads=(cut, *reckless.ads[1:]))
+    assert has_gaps(screening)
+    assert f"ADS {cut.ego}: cut: the scenario ended at 100 s" in terminal_text(screening)
 
 
 def test_the_text_puts_both_drivers_side_by_side(reckless: Screening) -> None:
