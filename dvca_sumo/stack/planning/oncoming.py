@@ -14,6 +14,8 @@ from dvca_sumo.stack.planning.st_graph import Graph
 
 _RECENT = 4  # last times of a future, over which its speed is taken
 _COMES = 0.5  # [m/s] slower ones are not expected to get there
+_SHORT = 5.0  # [m] of such a stretch: all of it is seen within a prediction
+_NEAR = 1.0  # [m] from a place, or past it, an ego at walking pace still stops there
 _CREEPS = 1.0  # [m/s] of the ego beyond the end of its profile, at least
 
 
@@ -23,7 +25,8 @@ def waits(
     """Places to wait for those whom an ego that drives `profile` would meet on a stretch beyond its lane's edge.
 
     They are looked for farther than they are predicted, at the speed they have then. What is begun is gone on with. On
-    junctions, and with people on foot, the rules of meeting hold.
+    junctions, and with people on foot, the rules of meeting hold. An ego that would stand on a junction for it, in the
+    way of others, waits before that; where it is too late for that, and the stretch is short, those rules hold, too.
     """
     window, scene = graph.window.up_to_fold(), graph.scene
     futures, begun = scene.futures, slice(0, int(shape.front) + 1)
@@ -49,9 +52,28 @@ def waits(
         arrives, leaves = _passage(row, futures, scene.times, begin, end)
         free = leaves + config.clear_margin
         if arrives < _time(profile, tail) + config.pass_margin and _time(profile, nose) < free:
-            give = config.yield_gap - HARD_GAP
-            found.append(Stop(nose - config.yield_gap, give, f"yield {graph.track(row)}", free))
+            place = _place(nose, tail, float(profile.speeds[0]), views, shape, config)
+            if place is not None:
+                found.append(Stop(*place, f"yield {graph.track(row)}", free))
     return found
+
+
+def _place(
+    nose: float, tail: float, speed: float, views: list[LineView], shape: VehicleShape, config: PlanningConfig
+) -> tuple[float, float] | None:
+    """Where to wait, and how much further hard braking may take the ego [m]; None where it goes on.
+
+    At arcs `nose` and `tail` [m] its bumpers come to the stretch and are past it.
+    """
+    usual = nose - config.yield_gap
+    for view in views:
+        if view.line.crosses and view.distance < usual < view.exit_distance + shape.length:
+            needed = speed * speed / (2.0 * max(view.waiting_distance + view.gap, _NEAR))
+            if view.may_wait and needed < config.comfort_braking:
+                return view.waiting_distance, view.gap
+            if tail - nose < shape.length + _SHORT:
+                return None
+    return usual, config.yield_gap - HARD_GAP
 
 
 def _beyond_lane(graph: Graph, window: Window, views: list[LineView]) -> tuple[Floats, Floats]:

@@ -5,10 +5,10 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from planned_drives import Drive, car, drive, person, road
+from planned_drives import SHAPE, Drive, car, drive, person, road, stop_line
 
 from dvca_sumo.messages import Floats
-from dvca_sumo.roadmap.route import Route
+from dvca_sumo.roadmap.route import Control, Route
 
 
 def hump(x: Floats, begin: float, end: float, side: float) -> Floats:
@@ -18,10 +18,10 @@ def hump(x: Floats, begin: float, end: float, side: float) -> Floats:
     return moved
 
 
-def swerving(side: float) -> Route:
-    """A straight lane, and a line that leaves it by 1.6 m to one side from 90 m to 145 m."""
+def swerving(side: float, end: float = 145.0) -> Route:
+    """A straight lane, and a line that leaves it by 1.6 m to one side from 90 m to `end`; by less if that is near."""
     x = np.arange(0.0, 600.0)
-    route = road(np.column_stack((x, hump(x, 90.0, 145.0, side))))
+    route = road(np.column_stack((x, hump(x, 90.0, end, side))))
     across = route.line.points[:, 1]
     return msgspec.structs.replace(
         route, lane_left=1.6 - across, lane_right=-1.6 - across, road_left=1.6 - across, road_right=-1.6 - across
@@ -39,6 +39,43 @@ def test_ego_waits_before_it_leaves_its_lane_for_who_comes_towards_it(x: float, 
     driven = meeting(x, speed, side=side)
     assert driven.clearances.min() > 0.5
     assert driven.fronts[-1] > 200.0
+
+
+def behind_a_junction(end: float) -> Route:
+    """The same lane, with a junction from 83 m to 95 m."""
+    return msgspec.structs.replace(swerving(1.0, end), stop_lines=(stop_line(83.0, Control.YIELD),))
+
+
+def standing_on_it(driven: Drive) -> Floats:
+    """Where the front bumper is while the ego stands with any of it on that junction [m]."""
+    fronts = driven.fronts[driven.speeds < 0.1]
+    found: Floats = fronts[(fronts > 83.5) & (fronts < 95.0 + SHAPE.length)]
+    return found
+
+
+def test_ego_waits_before_a_junction_and_not_on_it() -> None:
+    others = [car(5, 240.0, 3.2, heading=math.pi, speed=9.0)]
+    driven = drive(behind_a_junction(145.0), 30.0, speed=8.0, actors=others)
+    assert driven.speeds.min() < 0.1
+    assert not standing_on_it(driven).size
+    assert driven.clearances.min() > 0.5
+    assert driven.fronts[-1] > 200.0
+
+
+def test_ego_waits_on_a_junction_where_it_would_else_meet_who_comes_head_on() -> None:
+    others = [car(5, 190.0, 3.2, heading=math.pi, speed=9.0)]
+    driven = drive(behind_a_junction(145.0), 30.0, station=82.0, speed=5.0, actors=others)
+    assert standing_on_it(driven).size
+    assert driven.clearances.min() > 0.5
+    assert driven.fronts[-1] > 200.0
+
+
+@pytest.mark.parametrize("x", [130.0, 135.0])
+def test_on_a_junction_before_a_short_such_stretch_the_ego_loses_no_more_time_than_it_has_to(x: float) -> None:
+    others = [car(5, x, 3.2, heading=math.pi, speed=9.0)]
+    driven = drive(behind_a_junction(108.0), 15.0, station=82.0, speed=5.0, actors=others)
+    assert driven.clearances.min() > 0.5
+    assert driven.fronts[85] > 105.0
 
 
 def test_all_who_come_one_behind_the_other_are_waited_for() -> None:
