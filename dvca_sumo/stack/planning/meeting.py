@@ -80,13 +80,20 @@ class Meetings:
         room = stop.at + stop.give
         if room <= -HARD_GAP - self._beside(row, entry, graph, profile):  # stopping there would not help
             return None
-        is_too_late = profile.speeds[0] ** 2 / (2.0 * max(room, _LEAST_ROOM)) > config.hard_braking
-        if is_too_late and (
+        needed = profile.speeds[0] ** 2 / (2.0 * max(room, _LEAST_ROOM))
+        is_too_late = needed > config.hard_braking and (
             (not others_first and self._may_stop(row, entry, graph))  # the sooner the ego is gone, the better
             or self._passes([row], graph, profile, 0.0)[0]
-        ):
+        )
+        if is_too_late or (needed > config.comfort_braking and self._goes_on(row, graph, profile)):
             return None
         return Demand(row, stop, follows=self._joins(row, graph))
+
+    def _goes_on(self, row: int, graph: Graph, profile: Profile) -> bool:
+        """Whether the ego, having begun to pass in front of a vehicle, still does so with the least margin."""
+        if graph.scene.is_person[row] or graph.track(row) not in self._passing:
+            return False
+        return bool(self._passes([row], graph, profile, self._config.pass_margin_prior)[0])
 
     def _stops_in_way(self, demand: Demand, rows: list[int], graph: Graph, profile: Profile) -> bool:
         """Whether the ego would stop for somebody's future in the way of a likelier one, which it now passes before."""

@@ -78,6 +78,15 @@ def test_on_a_junction_before_a_short_such_stretch_the_ego_loses_no_more_time_th
     assert driven.fronts[85] > 105.0
 
 
+@pytest.mark.parametrize(("aside", "away"), [(3.3, 39.0), (3.6, 38.0), (3.9, 38.0)])
+def test_ego_that_passes_in_front_of_somebody_does_not_brake_hard_for_it_on_its_way(aside: float, away: float) -> None:
+    x, y = 104.0 + away * math.cos(0.4), aside + away * math.sin(0.4)
+    others = [car(5, x, y, heading=math.pi + 0.4, speed=9.0, lanes=("major_0",))]
+    driven = drive(behind_a_junction(108.0), 8.0, station=82.0, speed=5.0, actors=others)
+    assert driven.speeds.min() > 4.0
+    assert driven.clearances.min() > 1.5
+
+
 def test_all_who_come_one_behind_the_other_are_waited_for() -> None:
     driven = meeting(260.0, 9.0, cars=3)
     assert driven.clearances.min() > 0.5
