@@ -9,12 +9,30 @@ from screen_scenes import HEAR, TRAFFIC, draw, drive, traffic
 from small_scenarios import driven as driven_alone
 from small_scenarios import in_child
 
+from dvca_sumo.scenario import Scenario
 from dvca_sumo.screen.anchor import anchored
 from dvca_sumo.screen.driving import driven
 from dvca_sumo.screen.judging import Fault
 from dvca_sumo.screen.results import TripOutcome
 from dvca_sumo.screen.trips import Trip
 from dvca_sumo.stack.sources import StackSource
+
+
+@pytest.fixture
+def lane(plain_file: Callable[..., Path]) -> Path:
+    """A single lane, 400 m long."""
+    return plain_file(
+        '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/>', '<edge id="we" from="w" to="e" speed="13.9"/>'
+    )
+
+
+def behind_a_slow_one(folder: Path, lane: Path, speed: str, end: str) -> tuple[Scenario, list[Trip]]:
+    """An ego on that lane behind a vehicle no faster than `speed` [m/s], until `end` [s]."""
+    routes = (
+        f'<vType id="slow" maxSpeed="{speed}"/><vehicle id="other" type="slow" depart="0" departPos="95">'
+        '<route edges="we"/></vehicle><trip id="ego" from="we" to="we" depart="1"/>'
+    )
+    return traffic(folder, lane, routes, end=end), [Trip("ego", 1.0, 395.0, 29.0, 400.0)]
 
 
 def test_a_trip_alone_is_bit_for_bit_the_run_of_that_ego(tmp_path: Path, street: Path) -> None:
@@ -99,17 +117,14 @@ def test_sumos_drivers_make_no_stops_that_the_ads_does_not_make(tmp_path: Path, 
     ids=["in a jam", "behind who stops there"],
 )
 def test_an_ego_held_up_in_a_jam_is_not_at_fault(
-    tmp_path: Path, plain_file: Callable[..., Path], other: str, stop: str, fault: Fault
+    tmp_path: Path, lane: Path, other: str, stop: str, fault: Fault
 ) -> None:
     """SUMO's vehicles stand in jams that only a teleport ends; one that means to stand there is to be passed."""
-    net = plain_file(
-        '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/>', '<edge id="we" from="w" to="e" speed="13.9"/>'
-    )
     routes = (
         f'<vType id="stuck" maxSpeed="0.01"/><vehicle id="other" {other} depart="0" departPos="195">'
         f'<route edges="we"/>{stop}</vehicle><trip id="ego" from="we" to="we" depart="1"/>'
     )
-    scenario = traffic(tmp_path, net, routes, end="400")
+    scenario = traffic(tmp_path, lane, routes, end="400")
     found = in_child(partial(driven, scenario, StackSource(), [Trip("ego", 1.0, 395.0, 29.0, 40.0)], 1, HEAR))
     (result,) = found.results
     assert result.outcome is TripOutcome.TIME_OVER
@@ -122,17 +137,9 @@ def test_an_ego_held_up_in_a_jam_is_not_at_fault(
 
 @pytest.mark.parametrize(("speed", "held"), [("1", 250.0), ("12", 0.0)], ids=["behind a slow one", "in free traffic"])
 def test_time_in_a_queue_is_what_the_ego_loses_behind_slow_ones(
-    tmp_path: Path, plain_file: Callable[..., Path], speed: str, held: float
+    tmp_path: Path, lane: Path, speed: str, held: float
 ) -> None:
-    net = plain_file(
-        '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/>', '<edge id="we" from="w" to="e" speed="13.9"/>'
-    )
-    routes = (
-        f'<vType id="slow" maxSpeed="{speed}"/><vehicle id="other" type="slow" depart="0" departPos="95">'
-        '<route edges="we"/></vehicle><trip id="ego" from="we" to="we" depart="1"/>'
-    )
-    scenario = traffic(tmp_path, net, routes, end="600")
-    trips = [Trip("ego", 1.0, 395.0, 29.0, 400.0)]
+    scenario, trips = behind_a_slow_one(tmp_path, lane, speed, "600")
     ((result,), (native,)) = (
         in_child(partial(driven, scenario, StackSource(), trips, 1, HEAR)).results,
         in_child(partial(anchored, scenario, trips, HEAR)).results,
@@ -147,17 +154,9 @@ def test_time_in_a_queue_is_what_the_ego_loses_behind_slow_ones(
 
 @pytest.mark.parametrize(("end", "outcome"), [("100", TripOutcome.CUT), ("300", TripOutcome.TIME_OVER)])
 def test_what_comes_of_a_trip_is_not_known_where_the_scenario_ends_before_its_patience(
-    tmp_path: Path, plain_file: Callable[..., Path], end: str, outcome: TripOutcome
+    tmp_path: Path, lane: Path, end: str, outcome: TripOutcome
 ) -> None:
-    net = plain_file(
-        '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/>', '<edge id="we" from="w" to="e" speed="13.9"/>'
-    )
-    routes = (
-        '<vType id="slow" maxSpeed="1"/><vehicle id="other" type="slow" depart="0" departPos="95">'
-        '<route edges="we"/></vehicle><trip id="ego" from="we" to="we" depart="1"/>'
-    )
-    scenario = traffic(tmp_path, net, routes, end=end)
-    trips = [Trip("ego", 1.0, 395.0, 29.0, 400.0)]
+    scenario, trips = behind_a_slow_one(tmp_path, lane, "1", end)
     (result,) = in_child(partial(driven, scenario, StackSource(), trips, 1, HEAR)).results
     (native,) = in_child(partial(anchored, scenario, trips, HEAR)).results
     assert native.outcome is TripOutcome.CUT  # SUMO's drivers have more patience
@@ -170,18 +169,13 @@ def test_what_comes_of_a_trip_is_not_known_where_the_scenario_ends_before_its_pa
         assert [one.violation.kind for one in result.violations] == ["destination_not_reached"]
 
 
-def test_an_ego_is_not_held_up_by_a_queue_that_another_ego_heads(
-    tmp_path: Path, plain_file: Callable[..., Path]
-) -> None:
-    net = plain_file(
-        '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/>', '<edge id="we" from="w" to="e" speed="13.9"/>'
-    )
+def test_an_ego_is_not_held_up_by_a_queue_that_another_ego_heads(tmp_path: Path, lane: Path) -> None:
     routes = (
         '<vehicle id="parked" depart="0" departPos="195"><route edges="we"/><stop lane="we_0" endPos="200" '
         'duration="1000"/></vehicle><trip id="head" from="we" to="we" depart="1" departPos="100"/>'
         '<trip id="between" from="we" to="we" depart="5"/><trip id="tail" from="we" to="we" depart="15"/>'
     )
-    scenario = traffic(tmp_path, net, routes, end="400")
+    scenario = traffic(tmp_path, lane, routes, end="400")
     trips = [Trip(name, at, 395.0, 29.0, 40.0) for name, at in (("head", 1.0), ("tail", 15.0))]
     head, tail = in_child(partial(driven, scenario, StackSource(), trips, 2, HEAR)).results
     assert (head.ego, tail.ego) == ("head", "tail")
@@ -194,16 +188,13 @@ def test_an_ego_is_not_held_up_by_a_queue_that_another_ego_heads(
     ("patience", "stood", "teleports"), [("-1", 2, 0), ("130", 1, 1)], ids=["for ever", "the first is teleported"]
 )
 def test_sumos_vehicles_that_stand_and_are_teleported_are_counted(
-    tmp_path: Path, plain_file: Callable[..., Path], patience: str, stood: int, teleports: int
+    tmp_path: Path, lane: Path, patience: str, stood: int, teleports: int
 ) -> None:
-    net = plain_file(
-        '<node id="w" x="0" y="0"/><node id="e" x="400" y="0"/>', '<edge id="we" from="w" to="e" speed="13.9"/>'
-    )
     routes = (
         '<vType id="stuck" maxSpeed="0.01"/><vehicle id="other" type="stuck" depart="0" departPos="195">'
         '<route edges="we"/></vehicle><trip id="ego" from="we" to="we" depart="1"/>'
     )
-    scenario = traffic(tmp_path, net, routes, end="200", time_to_teleport=patience)
+    scenario = traffic(tmp_path, lane, routes, end="200", time_to_teleport=patience)
     found = in_child(partial(anchored, scenario, [Trip("ego", 1.0, 395.0, 29.0, 40.0)], HEAR)).neighbours
     assert (found.stood, found.teleports) == (stood, teleports)
     assert 0.0 < found.hours <= 2 * 200.0 / 3600.0
