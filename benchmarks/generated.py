@@ -8,14 +8,12 @@ on foot where there are pavements; lorries, buses and motorcycles among the cars
 see them stands in FOLDER/NAME/out/screening.txt.
 """
 
-import argparse
-import json
-import subprocess
 import sys
 from pathlib import Path
 from typing import NamedTuple
 
 import roundabouts
+import rows
 import sumo
 import sumolib
 
@@ -76,7 +74,6 @@ MIX = """<additional><vTypeDistribution id="mix">
 </vTypeDistribution></additional>"""
 SUBLANE = '<processing><lateral-resolution value="0.8"/></processing>'
 BEGIN, END = "100", "1100"  # [s]
-SCREEN = "from dvca_sumo.cli import main; main()"
 
 
 def built(folder: Path, net: Net) -> Path:
@@ -97,8 +94,8 @@ def built(folder: Path, net: Net) -> Path:
         people = ["-o", "people.xml", "-r", "people.rou.xml", "-p", "1", "--seed=8", "--pedestrians", "--prefix=p"]
         commands.append([*trips, *people, "--max-distance=600"])
         routes += ",people.rou.xml"
-    for command in commands:
-        subprocess.run(command, cwd=folder, check=True, capture_output=True)  # noqa: S603 - SUMO's own programs
+    for program, *words in commands:
+        rows.run(program, words, folder)
     config = folder / "run.sumocfg"
     config.write_text(
         f'<configuration><input><net-file value="net.net.xml"/><route-files value="{routes}"/></input>'
@@ -109,29 +106,11 @@ def built(folder: Path, net: Net) -> Path:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--nets", default=",".join(NETS))
-    parser.add_argument("--egos", default="60")
-    parser.add_argument("--seed", default="1")
-    parser.add_argument("--jobs", default="1")
-    options = parser.parse_args()
-    print("net                completed  collisions  violations  travel time (median)  SUMO's driver: violations")
-    for name in options.nets.split(","):
-        config = built(options.folder / name, NETS[name])
-        screen = ["screen", str(config), "--egos", options.egos, "--seed", options.seed, "--jobs", options.jobs]
-        screen += ["--begin", BEGIN, "--end", END, "-o", str(config.parent / "out"), "--json"]
-        run = subprocess.run([sys.executable, "-c", SCREEN, *screen], check=False, capture_output=True, text=True)  # noqa: S603
-        if not run.stdout:
-            raise SystemExit(run.stderr)
-        found = json.loads(run.stdout)
-        ads, theirs = found["ads"], found["sumo_driver"]
-        completed = f"{ads['completed']['count']}/{ads['completed']['total']}"
-        print(
-            f"{name:<17}{completed:>11}{ads['at_fault_collisions']:>12}{ads['at_fault_violations']:>12}"
-            f"{ads['travel_time_ratio']['median']:>22.2f}{theirs['at_fault_violations']:>27}",
-            flush=True,
-        )
+    asked = rows.arguments(list(NETS), egos=60)
+    print(rows.HEADER)
+    for name in asked.nets.split(","):
+        config = built(asked.folder / name, NETS[name])
+        print(rows.row(name, config, asked, "--begin", BEGIN, "--end", END), flush=True)
 
 
 if __name__ == "__main__":
