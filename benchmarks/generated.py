@@ -96,22 +96,9 @@ def built(folder: Path, net: Net) -> Path:
         routes += ",people.rou.xml"
     for program, *words in commands:
         rows.run(program, words, folder)
-    config = folder / "run.sumocfg"
-    config.write_text(
-        f'<configuration><input><net-file value="net.net.xml"/><route-files value="{routes}"/></input>'
-        f'<time><step-length value="0.1"/></time>{SUBLANE if net.is_sublane else ""}</configuration>'
-    )
-    return config
-
-
-def main() -> None:
-    """Print the table."""
-    asked = rows.arguments(list(NETS), egos=60)
-    print(rows.HEADER)
-    for name in asked.nets.split(","):
-        config = built(asked.folder / name, NETS[name])
-        print(rows.row(name, config, asked, "--begin", BEGIN, "--end", END), flush=True)
+    step = '<time><step-length value="0.1"/></time>'
+    return rows.configured(folder, step + (SUBLANE if net.is_sublane else ""), route=routes)
 
 
 if __name__ == "__main__":
-    main()
+    rows.table(NETS, built, 60, "--begin", BEGIN, "--end", END)

@@ -4,13 +4,33 @@ import argparse
 import json
 import subprocess
 import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TypeVar
 
-HEADER = "net                       completed  collisions  violations  travel time (median)  SUMO's driver: violations"
+Net = TypeVar("Net")
+
+_HEADER = "net                       completed  collisions  violations  travel time (median)  SUMO's driver: violations"
 _SCREEN = "from dvca_sumo.cli import main; main()"
 
 
-def arguments(nets: list[str], egos: int) -> argparse.Namespace:
+def table(nets: Mapping[str, Net], built: Callable[[Path, Net], Path], egos: int, *window: str) -> None:
+    """Print it, of those nets that are asked for, each `built` in a folder of its own."""
+    asked = _arguments(list(nets), egos)
+    print(_HEADER)
+    for name in asked.nets.split(","):
+        print(_row(name, built(asked.folder / name, nets[name]), asked, *window), flush=True)
+
+
+def configured(folder: Path, further: str, **files: str) -> Path:
+    """The configuration of the net in a folder, with its other input `files` by kind, and `further` options."""
+    others = "".join(f'<{kind}-files value="{names}"/>' for kind, names in files.items())
+    config = folder / "run.sumocfg"
+    config.write_text(f'<configuration><input><net-file value="net.net.xml"/>{others}</input>{further}</configuration>')
+    return config
+
+
+def _arguments(nets: list[str], egos: int) -> argparse.Namespace:
     """What is asked for: a folder to build in, some of the `nets` or all, so many `egos` each, a seed, jobs."""
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=Path)
@@ -26,7 +46,7 @@ def run(program: str, options: list[str], folder: Path) -> None:
     subprocess.run([program, *options], cwd=folder, check=True, capture_output=True)  # noqa: S603
 
 
-def row(name: str, config: Path, asked: argparse.Namespace, *window: str) -> str:
+def _row(name: str, config: Path, asked: argparse.Namespace, *window: str) -> str:
     """Screen a net, with further options of `dvca-sumo screen`; all of it stands in the folder `out` beside it."""
     words = ["screen", str(config), "--egos", asked.egos, "--seed", asked.seed, "--jobs", asked.jobs, *window]
     words += ["-o", str(config.parent / "out"), "--json"]

@@ -157,21 +157,9 @@ def built(folder: Path, skill: Skill) -> Path:
     rows.run(sumolib.checkBinary("netconvert"), options, folder)
     (folder / "routes.rou.xml").write_text(f"<routes>{skill.demand}</routes>")
     (folder / "more.add.xml").write_text(f"<additional>{skill.additional}</additional>")
-    config = folder / "run.sumocfg"
-    config.write_text(
-        '<configuration><input><net-file value="net.net.xml"/><route-files value="routes.rou.xml"/>'
-        f'<additional-files value="more.add.xml"/></input><time><end value="{END}"/></time></configuration>'
-    )
-    return config
-
-
-def main() -> None:
-    """Print the table."""
-    asked = rows.arguments(list(SKILLS), egos=20)
-    print(rows.HEADER)
-    for name in asked.nets.split(","):
-        print(rows.row(name, built(asked.folder / name, SKILLS[name]), asked), flush=True)
+    end = f'<time><end value="{END}"/></time>'
+    return rows.configured(folder, end, route="routes.rou.xml", additional="more.add.xml")
 
 
 if __name__ == "__main__":
-    main()
+    rows.table(SKILLS, built, 20)
