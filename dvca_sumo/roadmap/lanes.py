@@ -31,6 +31,8 @@ class Lane(msgspec.Struct, frozen=True, eq=False, gc=False):
     is_crossing: bool  # for pedestrians across the road
     is_pavement: bool  # for pedestrians alone, beside or away from the road
     is_drivable: bool  # for the vehicle class the map was loaded for
+    is_for_buses: bool  # whether they may use it, maybe with others
+    is_for_bicycles: bool
     left: str | None
     right: str | None
     successors: tuple[str, ...]

@@ -112,6 +112,8 @@ def _lanes(edge: Any, vehicle_class: str, *, is_left_hand: bool) -> Iterator[Lan
             is_crossing=edge.getFunction() == "crossing",
             is_pavement=not edge.getFunction() and set(lane.getPermissions()) == {"pedestrian"},
             is_drivable=drivable[index],
+            is_for_buses=_allows(lane, "bus"),
+            is_for_bicycles=_allows(lane, "bicycle"),
             left=lower if is_left_hand else upper,
             right=upper if is_left_hand else lower,
             successors=tuple(_successors(lane)),

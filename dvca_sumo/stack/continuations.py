@@ -1,10 +1,15 @@
 """Where lanes lead on: the continuations of a lane that are likely, told from the map alone."""
 
+import enum
 import heapq
 from typing import NamedTuple
 
 from dvca_sumo.geometry.angles import wrapped
-from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.messages import ObjectClass
+from dvca_sumo.roadmap import Lane, RoadMap
+
+_BICYCLE = int(ObjectClass.BICYCLE)
+_BUS_LENGTH = 9.0  # [m]
 
 _STRAIGHT = 0.35  # [rad] less turning than this goes straight on
 _STRAIGHT_WEIGHT = 3.0  # going straight against turning
@@ -13,9 +18,30 @@ _TURNAROUND_WEIGHT = 0.1
 _LEAST = 0.05  # probability of a way at a fork that is looked at in any case
 
 
+class Traffic(enum.IntEnum):
+    """Who has ways that are closed to others: the lanes kept for them."""
+
+    CARS = 0
+    BUSES = 1
+    BICYCLES = 2
+
+    @staticmethod
+    def of(object_class: int, length: float) -> "Traffic":
+        """What an object `length` [m] long may be: a long one a bus."""
+        if object_class == _BICYCLE:
+            return Traffic.BICYCLES
+        return Traffic.BUSES if length >= _BUS_LENGTH else Traffic.CARS
+
+    def may_use(self, lane: Lane) -> bool:
+        """Whether `lane` is the ego's kind of lane, or one for this kind of traffic."""
+        is_kept_for_it = (False, lane.is_for_buses, lane.is_for_bicycles)[self]
+        return lane.is_drivable or is_kept_for_it
+
+
 class _End(NamedTuple):
     """How far a continuation is known."""
 
+    traffic: Traffic
     probability: float
     lanes: tuple[str, ...]
     covered: float  # [m]
@@ -28,13 +54,13 @@ class Continuations:
         self._lanes = roadmap.lanes
         self._max_branches = max_branches
 
-    def of(self, lane: str, length: float) -> list[tuple[float, tuple[str, ...]]]:
+    def of(self, lane: str, length: float, traffic: Traffic) -> list[tuple[float, tuple[str, ...]]]:
         """Probabilities, not normalized, and lanes from `lane` on until `length` [m] are covered, or the road ends.
 
-        They are the likeliest ones, and of each way at the first fork at least the likeliest: those of a way share
-        its probability.
+        They are the likeliest ones open to `traffic`, and of each way at the first fork at least the likeliest: those
+        of a way share its probability.
         """
-        fork = self._fork(lane, length)
+        fork = self._fork(lane, length, traffic)
         likeliest = self._likeliest(fork, length, self._max_branches)
         if fork.covered >= length:
             return likeliest
@@ -47,9 +73,9 @@ class Continuations:
                 found += [(way.probability * probability / total, lanes) for probability, lanes in taken]
         return found or likeliest
 
-    def _fork(self, lane: str, length: float) -> _End:
+    def _fork(self, lane: str, length: float, traffic: Traffic) -> _End:
         """As far as there is one way only, up to `length` [m]."""
-        end = _End(1.0, (lane,), self._lanes[lane].line.length)
+        end = _End(traffic, 1.0, (lane,), self._lanes[lane].line.length)
         while end.covered < length and len(onward := self._onward(end)) == 1:
             end = onward[0]
         return end
@@ -69,18 +95,22 @@ class Continuations:
 
     def _onward(self, end: _End) -> list[_End]:
         """One lane further."""
-        weights = self._weights(end.lanes[-1])
+        weights = self._weights(end.lanes[-1], end.traffic)
         total = sum(weights.values())
         return [
-            _End(end.probability * weight / total, (*end.lanes, lane), end.covered + self._lanes[lane].line.length)
+            end._replace(
+                probability=end.probability * weight / total,
+                lanes=(*end.lanes, lane),
+                covered=end.covered + self._lanes[lane].line.length,
+            )
             for lane, weight in weights.items()
         ]
 
-    def _weights(self, lane: str) -> dict[str, float]:
+    def _weights(self, lane: str, traffic: Traffic) -> dict[str, float]:
         """How likely each successor is, against the others. Off the ego's kind of lane, all ways are open."""
         lanes = self._lanes
-        drivable = [name for name in lanes[lane].successors if lanes[name].is_drivable]
-        followed = drivable if drivable and lanes[lane].is_drivable else lanes[lane].successors
+        open_ways = [name for name in lanes[lane].successors if traffic.may_use(lanes[name])]
+        followed = open_ways if open_ways and lanes[lane].is_drivable else lanes[lane].successors
         weights = {}
         for name in followed:
             headings = lanes[name].line.headings

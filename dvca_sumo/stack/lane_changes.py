@@ -5,6 +5,7 @@ import numpy as np
 
 from dvca_sumo.messages import Floats, TrackedObjects
 from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.stack.continuations import Traffic
 from dvca_sumo.stack.lane_following import Candidates, joined
 from dvca_sumo.stack.lane_paths import LanePath, LanePaths, stretches_of
 
@@ -54,9 +55,11 @@ class LaneChanges:
             neighbour = self._neighbour(candidates.paths[row], float(candidates.placements.stations[row]), sides[row])
             if neighbour is not None:
                 lane, station = neighbour
+                owner = candidates.owners[row]
+                traffic = Traffic.of(tracked.classes[owner], tracked.boxes[owner, 3])
                 rows.append(row)
                 guesses.append(station)
-                paths.append(self._paths.branches(lane, station + float(reaches[candidates.owners[row]]))[0][0])
+                paths.append(self._paths.branches(lane, station + float(reaches[owner]), traffic)[0][0])
         if not rows:
             return candidates, drift
         owners = candidates.owners[rows]

@@ -15,6 +15,7 @@ import numpy as np
 from dvca_sumo.geometry.angles import wrapped, wrapped_all
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.stack.continuations import Traffic
 from dvca_sumo.stack.lane_paths import LanePath, LanePaths, Placements, stretches_of
 
 _NO_FIT = 1e30  # a misfit beyond that of any lane an object fits
@@ -53,6 +54,7 @@ class Movers(NamedTuple):
 
     rows: Integers  # (n,) object rows, ascending
     tracks: list[int]  # (n,)
+    traffic: list[Traffic]  # (n,)
     points: Floats  # (n, 2)
     headings: Floats  # (n,) [rad] directions of motion
     moved: Floats  # (n,) [m] since they were last seen
@@ -64,6 +66,7 @@ class Movers(NamedTuple):
         return Movers(
             self.rows[chosen],
             tracks,
+            [self.traffic[i] for i in chosen],
             self.points[chosen],
             self.headings[chosen],
             np.zeros(len(chosen)),
@@ -134,11 +137,12 @@ class LaneFollowing:
         """The candidates of movers that fit their lanes, and the positions of those that do not."""
         owners, paths, priors, guesses = [], [], [], []
         moved, reaches = movers.moved.tolist(), movers.reaches.tolist()
-        for i, (track, step, reach) in enumerate(zip(movers.tracks, moved, reaches, strict=True)):
+        each = zip(movers.tracks, movers.traffic, moved, reaches, strict=True)
+        for i, (track, traffic, step, reach) in enumerate(each):
             anchor = self._anchors[track]
             anchor.places = [(lane, station + step) for lane, station in anchor.places]
             for lane, station in anchor.places:
-                for path, probability in self._paths.branches(lane, station + reach):
+                for path, probability in self._paths.branches(lane, station + reach, traffic):
                     owners.append(i)
                     paths.append(path)
                     priors.append(probability)

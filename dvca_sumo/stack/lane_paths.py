@@ -16,7 +16,7 @@ import numpy as np
 from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap
-from dvca_sumo.stack.continuations import Continuations
+from dvca_sumo.stack.continuations import Continuations, Traffic
 
 # Rows of the table; what is looked up together is adjacent.
 _X, _Y, _HEADING, _HALF_WIDTH, _BEND_SPEED, _LIMIT, _ROWS = range(7)
@@ -73,14 +73,14 @@ class LanePaths:
         self._table = np.empty((_ROWS, 4096))
         self._used = 0
         self._paths: dict[tuple[str, ...], LanePath] = {}
-        self._branches: dict[tuple[str, int], tuple[tuple[LanePath, float], ...]] = {}
+        self._branches: dict[tuple[str, int, Traffic], tuple[tuple[LanePath, float], ...]] = {}
 
-    def branches(self, lane: str, length: float) -> tuple[tuple[LanePath, float], ...]:
-        """The likeliest continuations that reach `length` [m] from the start of `lane`; probabilities sum to 1."""
-        key = (lane, math.ceil(length / _LENGTH_STEP))
+    def branches(self, lane: str, length: float, traffic: Traffic) -> tuple[tuple[LanePath, float], ...]:
+        """The likeliest continuations for `traffic` `length` [m] from the start of `lane`; probabilities sum to 1."""
+        key = (lane, math.ceil(length / _LENGTH_STEP), traffic)
         found = self._branches.get(key)
         if found is None:
-            likely = self._continuations.of(lane, key[1] * _LENGTH_STEP)
+            likely = self._continuations.of(lane, key[1] * _LENGTH_STEP, traffic)
             total = sum(probability for probability, _ in likely)
             found = tuple((self._path(lanes), probability / total) for probability, lanes in likely)
             self._branches[key] = found

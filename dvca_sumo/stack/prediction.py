@@ -13,6 +13,7 @@ import numpy.typing as npt
 from dvca_sumo.geometry.angles import wrapped_all
 from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, PredictedObjects, TrackedObjects
 from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.stack.continuations import Traffic
 from dvca_sumo.stack.hypotheses import Hypotheses, message_of
 from dvca_sumo.stack.lane_changes import LaneChangeConfig, LaneChanges, lateral_speeds
 from dvca_sumo.stack.lane_following import Candidates, LaneFollowing, LaneMatchConfig, Movers
@@ -108,6 +109,7 @@ class MapPrediction:
             Movers(
                 rows=moving,
                 tracks=[tracks[row] for row in moving.tolist()],
+                traffic=[*map(Traffic.of, tracked.classes[moving].tolist(), tracked.boxes[moving, 3].tolist())],
                 points=points[moving],
                 headings=headings[moving],
                 moved=speeds[moving] * elapsed,

@@ -183,6 +183,31 @@ def test_every_way_at_the_first_fork_is_a_hypothesis_however_many_there_are_and_
     assert sum(shares.values()) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(
+    ("seen", "kept_for", "ways"),
+    [
+        (Seen(0.0, 0.0, length=12.0), "bus", 1),
+        (Seen(0.0, 0.0, length=4.5), "bus", 0),
+        (Seen(0.0, 0.0, speed=6.0, kind=ObjectClass.BICYCLE, length=1.6), "bicycle", 1),
+        (Seen(0.0, 0.0, length=12.0), "bicycle", 0),
+    ],
+)
+def test_onto_a_lane_kept_for_some_go_those_and_nobody_else(
+    plain: Callable[..., RoadMap], seen: Seen, kept_for: str, ways: int
+) -> None:
+    town = plain(
+        '<node id="from" x="-200" y="0"/><node id="o" x="0" y="0"/><node id="to" x="200" y="0"/>',
+        '<edge id="in" from="from" to="o"/>'
+        f'<edge id="out" from="o" to="to" numLanes="2"><lane index="0" allow="{kept_for}"/></edge>',
+        '<connection from="in" to="out" fromLane="0" toLane="0"/>'
+        '<connection from="in" to="out" fromLane="0" toLane="1"/>',
+    )
+    x, y, heading = lane_point(town, "in_0", town.lanes["in_0"].line.length - 15.0)
+    result = predicted(town, seen._replace(x=x, y=y, heading=heading))
+    assert len(ends(result, "out_0")) == ways
+    assert len(ends(result, "out_1")) == 1
+
+
 def test_ways_that_part_beyond_the_horizon_are_one_hypothesis(roadmap: RoadMap) -> None:
     result = predicted(roadmap, Seen(-78.0, RIGHT))
     assert result.lanes == (("in_0",),)
