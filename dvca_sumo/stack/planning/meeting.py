@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from dvca_sumo.messages import VehicleShape
+from dvca_sumo.messages import Floats, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView, has_priority
 from dvca_sumo.stack.planning.scene import ALONG, SOON, SOON_TIME, Flags
@@ -22,6 +22,7 @@ _SLOW = 4.0  # [m/s] no faster, an ego stops for people who come up to its side:
 _BESIDE_PERSON = 1.0  # ... [m] behind its front bumper, and all along it ...
 _BRUSHING = 0.2  # ... for those who would come so near to it, before it has passed them [m]; ...
 _BRUSHING_AT_REST = 0.35  # ... one at rest can wait [m]
+_SLOWS = 1.0  # [s] that others are foreseen to lose in bends and by braking, and may not lose
 _CLEAR_GAP = 0.5  # [m] lengthwise behind somebody who has passed
 
 
@@ -159,10 +160,26 @@ class Meetings:
         return way < (speed + _SPEEDS_UP) * SOON_TIME
 
     def _passes(self, rows: list[int], graph: Graph, profile: Profile, margin: float) -> Flags:
-        """Whether the ego has left every place that a future occupies `margin` [s] before it comes there."""
-        rear = np.interp(graph.scene.times - margin, STEP_TIMES, profile.arcs) - self._shape.rear_overhang
-        passes: Flags = np.all((rear > graph.ends[rows]) | ~graph.occupied[rows], axis=1)
-        return passes
+        """Whether the ego has left every place that a future occupies `margin` [s] before it comes there.
+
+        It does not count on anybody to slow down: ahead of one that keeps its speed it still is, by `_SLOWS` less.
+        """
+        scene = graph.scene
+        passes = self._is_gone(scene.times - margin, rows, graph, profile)
+        if not passes.any():
+            return passes
+        speeds = scene.speeds[scene.owners[rows]]
+        ways = np.hypot(np.diff(scene.futures.stations[rows]), np.diff(scene.futures.offsets[rows])).cumsum(axis=1)
+        times = np.broadcast_to(scene.times, (len(rows), len(scene.times))).copy()
+        keeps = speeds > self._config.standing_speed
+        times[keeps, 1:] = np.minimum(times[keeps, 1:], ways[keeps] / speeds[keeps, None])
+        return passes & self._is_gone(times - max(margin - _SLOWS, 0.0), rows, graph, profile)
+
+    def _is_gone(self, times: Floats, rows: list[int], graph: Graph, profile: Profile) -> Flags:
+        """Whether at `times` [s] the ego has left the places that the futures `rows` occupy one after the other."""
+        rear = np.interp(times, STEP_TIMES, profile.arcs) - self._shape.rear_overhang
+        gone: Flags = np.all((rear > graph.ends[rows]) | ~graph.occupied[rows], axis=1)
+        return gone
 
     def _comes_after(self, rows: list[int], graph: Graph, profile: Profile) -> Flags:
         """Whether the ego comes to every place that a future occupies after that has gone."""

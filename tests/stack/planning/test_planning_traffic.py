@@ -508,6 +508,16 @@ def test_stream_with_priority_is_waited_for_at_the_line() -> None:
     assert driven.fronts[-1] > 150.0
 
 
+@pytest.mark.parametrize(("way", "braking", "decision"), [(29.0, 1.5, "yield 3"), (36.0, 1.0, "cruise")])
+def test_ego_counts_on_nobody_with_priority_to_lose_time_by_slowing_down(
+    way: float, braking: float, decision: str
+) -> None:
+    """As it is predicted the ego would be gone 1.5 s before it comes; at its present speed, it would hardly be."""
+    coming = car(3, 106.0, -2.5 - way, heading=UP, speed=10.0, braking=braking, lanes=("major_0",))
+    planner = Planner(PlanningConfig(), road(stop_lines=[stop_line(100.0, Control.YIELD)]), SHAPE)
+    assert planner.step(believed(84.3, speed=8.0), predicted([coming], 0.0), {}).decision == decision
+
+
 @pytest.mark.parametrize(
     ("control", "nose", "slowest"),
     [
