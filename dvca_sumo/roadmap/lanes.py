@@ -83,7 +83,11 @@ class Junction(msgspec.Struct, frozen=True, eq=False):
 
     def prior(self, movement: Movement) -> frozenset[str]:
         """Lanes of the movements that have priority over `movement`."""
-        return _lanes(self._marked(self.responses.get(movement.index, "")))
+        return _lanes(self.prior_movements(movement))
+
+    def prior_movements(self, movement: Movement) -> tuple[Movement, ...]:
+        """The movements that have priority over `movement`, by link index."""
+        return self._marked(self.responses.get(movement.index, ""))
 
     def _marked(self, bits: str) -> tuple[Movement, ...]:
         return tuple(movement for bit, movement in zip(reversed(bits), self.movements, strict=False) if bit == "1")

@@ -1,7 +1,10 @@
 """Stop lines and pedestrian crossings of the movements a route takes."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
+from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.roadmap.lanes import Lane, Movement
 from dvca_sumo.roadmap.reading import NetContents
@@ -17,6 +20,7 @@ _CONTROLS = {
 }
 STOP_SIGNS = (Control.STOP, Control.ALL_WAY_STOP)
 _AROUND = 10.0  # [m] before and behind a junction a crossing may still touch the route
+_MERGING = 0.5  # [rad] between the directions of two approaches, at most
 _SAMPLE = 0.1  # [m]
 
 
@@ -37,6 +41,7 @@ def stop_line(net: NetContents, movement: Movement, line: Polyline, station: flo
         crosses=junction.conflicting(movement),
         exit_station=exit_station,
         stop_signs=_stop_signs(net, movement) if control in STOP_SIGNS else (),
+        prior=_prior(net, movement),
         direction=movement.direction,
         waiting_station=_waiting_station(net, movement, line, station, exit_station),
     )
@@ -57,9 +62,27 @@ def _stop_signs(net: NetContents, movement: Movement) -> tuple[Approach, ...]:
     """The approaches of other edges that come to stop signs of their own, in the junction's order."""
     own = net.lanes[movement.from_lane].edge
     foes = net.junctions[movement.junction].conflicting_movements(movement)
-    stopping = dict.fromkeys(foe.from_lane for foe in foes if _CONTROLS.get(foe.state) in STOP_SIGNS)
-    lanes = (net.lanes[lane] for lane in stopping)
-    return tuple(Approach(lane.id, lane.line, lane.width) for lane in lanes if lane.edge != own)
+    stopping = (foe for foe in foes if _CONTROLS.get(foe.state) in STOP_SIGNS)
+    return tuple(_approach(lane) for lane in _begins(net, stopping) if lane.edge != own)
+
+
+def _prior(net: NetContents, movement: Movement) -> tuple[Approach, ...]:
+    """The approaches of who has priority, but for people, and who merges: that one is seen along its way."""
+    own = net.lanes[movement.from_lane].line.headings[-1]
+    lanes = _begins(net, net.junctions[movement.junction].prior_movements(movement))
+    return tuple(
+        _approach(lane)
+        for lane in lanes
+        if not lane.is_crossing and abs(wrapped(float(lane.line.headings[-1] - own))) > _MERGING
+    )
+
+
+def _begins(net: NetContents, movements: Iterable[Movement]) -> list[Lane]:
+    return [net.lanes[name] for name in dict.fromkeys(movement.from_lane for movement in movements)]
+
+
+def _approach(lane: Lane) -> Approach:
+    return Approach(lane.id, lane.line, lane.width, lane.speed_limit)
 
 
 def crossings(

@@ -24,11 +24,12 @@ class Control(enum.StrEnum):
 
 
 class Approach(msgspec.Struct, frozen=True, eq=False):
-    """A lane that comes to a stop sign."""
+    """A lane that comes to a junction."""
 
     lane: str
-    line: Polyline  # centre line, up to the stop sign
+    line: Polyline  # centre line, up to the junction
     width: float  # [m]
+    speed_limit: float  # [m/s] by law
 
 
 class StopLine(msgspec.Struct, frozen=True, eq=False):
@@ -43,6 +44,7 @@ class StopLine(msgspec.Struct, frozen=True, eq=False):
     crosses: frozenset[str]  # lanes of all movements whose paths conflict
     exit_station: float  # [m] where the route leaves the junction
     stop_signs: tuple[Approach, ...] = ()  # others of conflicting movements, with STOP and ALL_WAY_STOP
+    prior: tuple[Approach, ...] = ()  # those of `yields_to` that come from aside or ahead
     direction: str = "s"  # of the movement, as `Movement` has it
     waiting_station: float | None = None  # [m] on the junction, where those wait who let the oncoming traffic pass
 

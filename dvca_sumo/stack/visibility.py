@@ -5,9 +5,12 @@ a body either hides what is behind it or, when it is too narrow, hides nothing.
 """
 
 import numpy as np
+import numpy.typing as npt
 
 from dvca_sumo.geometry.angles import wrapped_all
 from dvca_sumo.messages import Floats
+
+Flags = npt.NDArray[np.bool_]
 
 RAYS = 8  # cast per box, evenly over the angle it fills; the sensor resolves shares of 1/8
 
@@ -50,6 +53,14 @@ def visible_shares(boxes: Floats, occluder_width: float) -> Floats:
     unhidden = (own <= nearest + 1e-9) | np.isinf(own)
     shares: Floats = unhidden.sum(axis=1) / RAYS
     return shares
+
+
+def are_hidden(points: Floats, boxes: Floats, margin: float) -> Flags:
+    """Which `points` (k, 2) lie more than `margin` [m] behind the near side of one of the `boxes` (n, 5): (k,)."""
+    bearings = np.arctan2(points[:, 1], points[:, 0])
+    entries = _entries(boxes, bearings[None])
+    hidden: Flags = np.any(entries < np.hypot(points[:, 0], points[:, 1]) - margin, axis=0)
+    return hidden
 
 
 def _angles(boxes: Floats) -> tuple[Floats, Floats]:

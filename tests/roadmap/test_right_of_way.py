@@ -57,6 +57,38 @@ def test_left_turn_off_the_main_road_yields_to_oncoming_traffic(plain: NetBuilde
 
 
 @pytest.mark.parametrize(
+    ("before", "after", "lanes"),
+    [("sx", "xw", {"wx_0", "ex_0"}), ("sx", "xe", {"wx_0"}), ("ex", "xs", {"wx_0"}), ("wx", "xe", set())],
+)
+def test_lanes_from_where_somebody_with_priority_comes_are_known(
+    plain: NetBuilder, before: str, after: str, lanes: set[str]
+) -> None:
+    roadmap = tee(plain, "priority")
+    prior = first_line(roadmap, before, after).prior
+    assert {each.lane for each in prior} == lanes
+    for each in prior:
+        lane = roadmap.lanes[each.lane]
+        assert each.line is lane.line
+        assert (each.width, each.speed_limit) == (lane.width, lane.speed_limit)
+
+
+def test_of_those_with_priority_people_and_who_merges_have_no_such_lane(plain: NetBuilder, grid: NetBuilder) -> None:
+    ramp = plain(
+        '<node id="a" x="0" y="0"/><node id="m" x="300" y="0"/><node id="z" x="600" y="0"/>'
+        '<node id="r" x="0" y="-60"/>',
+        '<edge id="main" from="a" to="m" priority="3"/><edge id="on" from="m" to="z" priority="3"/>'
+        '<edge id="ramp" from="r" to="m" priority="1"/>',
+    )
+    line = first_line(ramp, "ramp", "on")
+    assert approaches(line.yields_to) == {"main_0"}
+    assert line.prior == ()
+    roadmap = grid("--sidewalks.guess", "--crossings.guess")
+    turning = roadmap.route(["A1B1", "B1B0"], "A1B1_1", 10.0, None, 100.0).stop_lines[0]
+    assert any(roadmap.lanes[lane].is_crossing for lane in turning.yields_to)
+    assert not any(roadmap.lanes[each.lane].is_crossing for each in turning.prior)
+
+
+@pytest.mark.parametrize(
     ("before", "after", "others"),
     [("wx", "xe", {"sx_0", "ex_0"}), ("wx", "xs", {"ex_0"}), ("ex", "xw", {"sx_0"}), ("sx", "xe", {"wx_0"})],
 )

@@ -5,11 +5,13 @@ import math
 import numpy as np
 import numpy.testing as npt
 import pytest
+import shapely
 
+from dvca_sumo.geometry.boxes import corners
 from dvca_sumo.messages import ObjectClass, SignalColour, VehicleShape
 from dvca_sumo.stack.protocols import Detections
 from dvca_sumo.stack.sensors import SensorConfig, Sensors
-from dvca_sumo.stack.visibility import nearest_distances, visible_shares
+from dvca_sumo.stack.visibility import are_hidden, nearest_distances, visible_shares
 from dvca_sumo.truth import EgoTruth, Moment, ObjectsTruth
 
 SHAPE = VehicleShape(length=4.7, width=1.9, wheelbase=2.8, rear_overhang=0.95)
@@ -25,6 +27,8 @@ NOISELESS = SensorConfig(
     corner_sigma=0.0,
     radial_speed_sigma=0.0,
 )
+
+HERE = shapely.Point(0.0, 0.0)
 
 Thing = tuple[ObjectClass, float, float, float, float, float]  # class, x, y, heading, vx, vy
 
@@ -154,6 +158,22 @@ def test_a_body_that_overlaps_the_sensor_is_seen_and_hides_nothing() -> None:
     touching, far = [0.0, 0.0, 0.3, 4.0, 2.0], [20.0, 0.0, 0.0, 4.6, 1.8]
     npt.assert_array_equal(visible_shares(np.array([touching, far]), 1.0), [1.0, 1.0])
     npt.assert_array_equal(nearest_distances(np.array([touching, far])), [0.0, 17.7])
+
+
+def test_a_place_is_hidden_whose_line_of_sight_enters_a_box_far_enough_before_it() -> None:
+    chance = np.random.default_rng(4)
+    boxes = np.column_stack(
+        (chance.uniform(-30.0, 30.0, (6, 2)), chance.uniform(-3.0, 3.0, 6), chance.uniform(1.0, 12.0, (6, 2)))
+    )
+    bodies = [shapely.Polygon(each) for each in corners(boxes)]
+    assert min(body.distance(HERE) for body in bodies) > 1.0
+    points = chance.uniform(-60.0, 60.0, (400, 2))
+    expected = [
+        any(body.intersects(sight) and body.intersection(sight).distance(HERE) < sight.length - 4.0 for body in bodies)
+        for sight in (shapely.LineString([HERE, shapely.Point(point)]) for point in points)
+    ]
+    assert 40 < sum(expected) < 360
+    npt.assert_array_equal(are_hidden(points, boxes, 4.0), expected)
 
 
 def test_the_same_key_gives_the_same_sweep_and_another_seed_or_index_another() -> None:

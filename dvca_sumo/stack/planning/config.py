@@ -97,7 +97,7 @@ class PlanningConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     expected_reaction: float = 0.5  # [s] of those who have to give way to the ego
     expected_braking: float = 4.5  # [m/s^2] and of them, after that
     give_way_speed: float = 8.0  # [m/s] at a line where others may have priority
-    peering_speed: float = 2.0  # [m/s] past such a line, up to the nose of who waits beside and hides what comes
+    peering_speed: float = 2.0  # [m/s] past such a line, where others hide who may come
 
     # Signals and signs.
     yellow_braking: float = 3.0  # [m/s^2] yellow means stop unless it takes more

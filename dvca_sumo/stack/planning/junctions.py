@@ -224,6 +224,7 @@ def _as_one(first: StopLine, second: StopLine) -> StopLine:
         control=second.control if first.control is Control.PRIORITY else first.control,
         yields_to=first.yields_to | second.yields_to,
         crosses=first.crosses | second.crosses,
+        prior=first.prior + second.prior,
         exit_station=second.exit_station,
     )
 

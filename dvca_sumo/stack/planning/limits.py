@@ -39,12 +39,14 @@ def speed_caps(
     graph: Graph,
     views: list[LineView],
     crossings: Sequence[Crossing],
+    blind: Sequence[tuple[float, float]],
     shape: VehicleShape,
     config: PlanningConfig,
 ) -> list[float]:
     """Highest speed by metre of path [m/s]: limit, curves, how fast the wheels turn, and whom the ego comes close to.
 
-    Each is braked for in comfort beforehand. `speed` is the ego's [m/s].
+    On the stretches `blind` [m] the ego feels its way. Each is braked for in comfort beforehand. `speed` is the ego's
+    [m/s].
     """
     path = graph.path
     caps = np.minimum(
@@ -55,7 +57,9 @@ def speed_caps(
     turning = config.steering_rate * _STEERED / (shape.wheelbase * np.maximum(changes, 1e-4))
     middle = slice(_STEERED // 2, _STEERED // 2 + len(turning))
     caps[middle] = np.minimum(caps[middle], turning)
-    for begin, end, cap in _slow_stretches(speed, graph, views, crossings, shape, config):
+    slow = [(begin, end, config.peering_speed) for begin, end in blind]
+    slow += _slow_stretches(speed, graph, views, crossings, shape, config)
+    for begin, end, cap in slow:
         if end > 0.0:
             part = slice(max(int(begin), 0), int(end) + 1)
             caps[part] = np.minimum(caps[part], cap)

@@ -28,6 +28,7 @@ from dvca_sumo.stack.planning.path import Path, lateral_start, path_along
 from dvca_sumo.stack.planning.reference import BEHIND, Reference
 from dvca_sumo.stack.planning.scene import scene_in
 from dvca_sumo.stack.planning.settling import Settling
+from dvca_sumo.stack.planning.sight import Sights
 from dvca_sumo.stack.planning.situation import Situation
 from dvca_sumo.stack.planning.speed import Profile, Stop, roll_out
 from dvca_sumo.stack.planning.st_graph import Graph, graph_of, leader_of, leading
@@ -53,6 +54,7 @@ class Planner:
         self._reference = Reference(route, shape, config)
         self._destination = stop_station(route, config)
         self._junctions = Junctions(route, shape, config)
+        self._sights = Sights(shape, config)
         gaps = Gaps(route.line, self._destination, shape, config)
         self._lane_changer = LaneChanger(route.lane_changes, gaps, shape, config)
         self._passing = Passing(route.passing_lanes, gaps, shape, config)
@@ -129,7 +131,9 @@ class Planner:
         plateaus = self._settling.step(lateral, window, start.speed, plateaus)
         path = path_along(window, start, lateral, plateaus, shape, config)
         graph = graph_of(scene, window, path, self._route, start.speed, shape, config)
-        profile = self._profile(start, graph, views, choice)
+        blind = self._sights.blind(views, path, start.speed, predicted)
+        caps = speed_caps(start.speed, graph, views, self._route.crossings, blind, shape, config)
+        profile = self._profile(start, graph, views, choice, caps)
         return _points(path, profile), profile.label or _described(nudges, path)
 
     def _reach(self, station: float, speed: float) -> float:
@@ -138,10 +142,11 @@ class Planner:
         gained = 0.5 * self._config.acceleration * _HORIZON
         return _HORIZON * max(speed, min(speed + gained, fastest)) + self._shape.front + _SPARE
 
-    def _profile(self, start: StartState, graph: Graph, views: list[LineView], choice: LaneChoice) -> Profile:
+    def _profile(
+        self, start: StartState, graph: Graph, views: list[LineView], choice: LaneChoice, caps: list[float]
+    ) -> Profile:
         """The fastest motion that all demands allow, found by adding demands until nobody else is in the way."""
         config, shape = self._config, self._shape
-        caps = speed_caps(start.speed, graph, views, self._route.crossings, shape, config)
         if abs(math.remainder(start.heading - float(graph.path.headings[0]), 2.0 * math.pi)) > _ASTRAY:
             caps = [min(cap, config.astray_speed) for cap in caps]
         leaders, others = leading(graph, self._lanes, shape, config)

@@ -18,7 +18,7 @@ from dvca_sumo.stack.reference import StackConfig
 
 FIXED = PlanningConfig()
 BUGGY = build_with("planfuzz-v7", StackConfig()).planning
-APPROACH = Approach("south_0", Polyline(np.array([[106.0, -60.0], [106.0, -6.0]])), 3.2)
+APPROACH = Approach("south_0", Polyline(np.array([[106.0, -60.0], [106.0, -6.0]])), 3.2, 13.9)
 
 
 def at_sign(actors: Sequence[Actor], config: PlanningConfig = FIXED, seconds: float = 40.0) -> Drive:
