@@ -8,12 +8,11 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
 from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.boxes import box_of, contact_times, distances
 from dvca_sumo.geometry.polyline import Polyline
-from dvca_sumo.messages import Floats, Integers
+from dvca_sumo.messages import Flags, Floats, Integers
 from dvca_sumo.oracles.ahead import ahead
 from dvca_sumo.oracles.findings import Findings
 from dvca_sumo.oracles.place import Places
@@ -21,7 +20,6 @@ from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import Moment, ObjectsTruth
 from dvca_sumo.violations import Category, Ending, Judgement, Violation
 
-Flags = npt.NDArray[np.bool_]
 Motion = Callable[[float], tuple[float, float, float]]  # where a body is after so many seconds: x, y, heading
 
 _STEP = 0.05  # [s] between the places where two are compared

@@ -10,9 +10,9 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.angles import wrapped_all
-from dvca_sumo.messages import Floats, Integers, LocalizationEstimate, ObjectClass, SignalColour, TrackedObjects
+from dvca_sumo.messages import Flags, Floats, Integers, LocalizationEstimate, ObjectClass, SignalColour, TrackedObjects
 from dvca_sumo.stack.protocols import Detections
-from dvca_sumo.stack.tracks import Flags, Measurements, MotionConfig, Tracks
+from dvca_sumo.stack.tracks import Measurements, MotionConfig, Tracks
 
 _STATIC = int(ObjectClass.STATIC)  # numpy compares with a plain number ten times as fast
 

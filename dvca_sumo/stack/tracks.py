@@ -8,9 +8,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.angles import wrapped_all
-from dvca_sumo.messages import Floats, Integers, ObjectClass
-
-Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+from dvca_sumo.messages import Flags, Floats, Integers, ObjectClass
 
 _CLASSES = len(ObjectClass)
 _LAST_ON_WHEELS = int(ObjectClass.BICYCLE)  # vehicles and bicycles, by class number, move along their heading only

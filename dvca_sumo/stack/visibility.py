@@ -5,12 +5,9 @@ a body either hides what is behind it or, when it is too narrow, hides nothing.
 """
 
 import numpy as np
-import numpy.typing as npt
 
 from dvca_sumo.geometry.angles import wrapped_all
-from dvca_sumo.messages import Floats
-
-Flags = npt.NDArray[np.bool_]
+from dvca_sumo.messages import Flags, Floats
 
 RAYS = 8  # cast per box, evenly over the angle it fills; the sensor resolves shares of 1/8
 

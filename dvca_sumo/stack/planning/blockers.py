@@ -7,10 +7,10 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.boxes import outlines
-from dvca_sumo.messages import Floats, ObjectClass, VehicleShape
+from dvca_sumo.messages import Flags, Floats, ObjectClass, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.reference import BEHIND, Window
-from dvca_sumo.stack.planning.scene import Flags, Scene
+from dvca_sumo.stack.planning.scene import Scene
 
 LENGTHWISE = 1.0  # [m] kept around an object before the ego moves back
 SLOWEST = 3.0  # [m/s] assumed of the ego when it passes

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, VehicleShape
+from dvca_sumo.messages import PREDICTION_TIMES, Flags, Floats, Integers, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
-from dvca_sumo.stack.planning.scene import ALONG, Flags
+from dvca_sumo.stack.planning.scene import ALONG
 from dvca_sumo.stack.planning.st_graph import Graph
 
 _SOON = int(np.searchsorted(PREDICTION_TIMES, 3.0))

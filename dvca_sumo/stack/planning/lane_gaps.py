@@ -11,12 +11,12 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.polyline import Polyline
-from dvca_sumo.messages import Floats, ObjectClass, TrackedObjects, VehicleShape
+from dvca_sumo.messages import Flags, Floats, ObjectClass, TrackedObjects, VehicleShape
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.moves import blend_length
 from dvca_sumo.stack.planning.reference import Window
-from dvca_sumo.stack.planning.scene import ALONG, IN_LANE, Flags
+from dvca_sumo.stack.planning.scene import ALONG, IN_LANE
 
 _PERSON, _STATIC = int(ObjectClass.PEDESTRIAN), int(ObjectClass.STATIC)
 LAST_SPEED = 3.0  # [m/s] at which a change in the last moment is done

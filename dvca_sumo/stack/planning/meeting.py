@@ -6,10 +6,10 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from dvca_sumo.messages import Floats, VehicleShape
+from dvca_sumo.messages import Flags, Floats, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView, has_priority
-from dvca_sumo.stack.planning.scene import ALONG, SOON, SOON_TIME, Flags
+from dvca_sumo.stack.planning.scene import ALONG, SOON, SOON_TIME
 from dvca_sumo.stack.planning.speed import HARD_GAP, STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import PRESENT, Graph
 

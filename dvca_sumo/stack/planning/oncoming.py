@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from dvca_sumo.messages import Floats, VehicleShape
+from dvca_sumo.messages import Flags, Floats, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.reference import BEHIND, Window
-from dvca_sumo.stack.planning.scene import ALONG, Extents, Flags, extents
+from dvca_sumo.stack.planning.scene import ALONG, Extents, extents
 from dvca_sumo.stack.planning.speed import HARD_GAP, STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import Graph
 

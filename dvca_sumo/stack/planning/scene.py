@@ -4,13 +4,10 @@ from collections.abc import Container
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
-from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, PredictedObjects
+from dvca_sumo.messages import PREDICTION_TIMES, Flags, Floats, Integers, ObjectClass, PredictedObjects
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.reference import BEHIND, Window
-
-Flags = npt.NDArray[np.bool_]
 
 _PERSON = int(ObjectClass.PEDESTRIAN)
 IN_LANE = 1.2  # [m] vehicles whose middle is this near the middle of a lane are in it, not parked beside it

@@ -5,11 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dvca_sumo.messages import Floats, VehicleShape
+from dvca_sumo.messages import Flags, Floats, VehicleShape
 from dvca_sumo.stack.planning.blockers import SLOWEST, Blocker
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.moves import blend_length
-from dvca_sumo.stack.planning.scene import Flags
 from dvca_sumo.stack.planning.situation import Situation
 
 _BAND_GAP = 3.0  # [m] lengthwise to others in the neighbouring lane

@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 
-from dvca_sumo.messages import PREDICTION_STEP, Floats, PredictedObjects, VehicleShape
+from dvca_sumo.messages import PREDICTION_STEP, Flags, Floats, Integers, PredictedObjects, VehicleShape
 from dvca_sumo.roadmap.route import Control, StopLine
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.path import Path
-from dvca_sumo.stack.planning.scene import Flags
 from dvca_sumo.stack.visibility import are_hidden
 
 _BEFORE = 45.0  # [m] before a line the ego begins to look
@@ -23,7 +22,7 @@ _SURE = 60.0  # [m] within which the ego has found everybody who is in sight
 _NEAR = 50.0  # [m] around the ego, who may hide others
 _TOUCH = 0.3  # [m] smallest distance to brake on
 _ALL_WAIT = (Control.PRIORITY, Control.ALL_WAY_STOP)  # for the ego, or at their own signs
-_NARROW = 1.0  # [m] no wider ones hide nothing
+_NARROW = 1.0  # [m] who is no wider hides nobody
 _ON_LANE = (2.0, 0.3)  # [m] from a body, lengthwise and sideways: a place there is taken
 
 
@@ -59,7 +58,7 @@ class Sights:
         return found
 
     def _is_too_late(self, distance: float, speed: float) -> bool:
-        """Whether slowing down, so far before the line [m], takes more than comfort."""
+        """Whether slowing down until it sees all or nothing, so far before the line [m], takes more than comfort."""
         config = self._config
         lost = speed * speed - config.peering_speed**2
         return lost > 2.0 * config.comfort_braking * max(distance + _END, _TOUCH)
@@ -80,9 +79,10 @@ class Sights:
         peering, gain = config.peering_speed, config.acceleration
         needed = (math.sqrt(peering**2 + 2.0 * gain * max(past, 0.0)) - peering) / gain
         places = lanes.in_reach(needed)
+        likeliest = predicted.probabilities.argsort(kind="stable")  # the last one of each object
         for nose in (start, *(place for look in _LOOKS if (place := view.distance + look) > start)):
             wait = start / max(speed, _SLOWEST) + (nose - start) / peering
-            ahead = _boxes_in(predicted, wait)[hides]
+            ahead = _boxes_in(predicted, likeliest, wait)[hides]
             if not lanes.is_blind(places, _eyes(path, nose + shape.centre), ahead, wait):
                 return nose
         return view.distance + _END
@@ -158,10 +158,9 @@ def _eyes(path: Path, arc: float) -> Floats:
     return np.array((np.interp(arc, path.arcs, path.x), np.interp(arc, path.arcs, path.y)))
 
 
-def _boxes_in(predicted: PredictedObjects, wait: float) -> Floats:
-    """(n, 5) `wait` [s] from now, as the likeliest future of each object has it."""
+def _boxes_in(predicted: PredictedObjects, likeliest: Integers, wait: float) -> Floats:
+    """(n, 5) `wait` [s] from now, as the future of each object has it that comes last in the order `likeliest` (h,)."""
     boxes = predicted.objects.boxes.copy()
-    order = predicted.probabilities.argsort(kind="stable")  # the last one written is the likeliest
     column = min(round(wait / PREDICTION_STEP), predicted.poses.shape[1] - 1)
-    boxes[predicted.owners[order], :3] = predicted.poses[order, column]
+    boxes[predicted.owners[likeliest], :3] = predicted.poses[likeliest, column]
     return boxes

@@ -4,12 +4,12 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.boxes import outlines
-from dvca_sumo.messages import PREDICTION_STEP, Floats, Integers, ObjectClass, VehicleShape
+from dvca_sumo.messages import PREDICTION_STEP, Flags, Floats, Integers, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Crossing, Overpass, Route
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Path
 from dvca_sumo.stack.planning.reference import BEHIND, Window
-from dvca_sumo.stack.planning.scene import ALONG, Flags, Scene
+from dvca_sumo.stack.planning.scene import ALONG, Scene
 from dvca_sumo.stack.planning.speed import STEP_TIMES, Leader
 
 PRESENT = 0.3  # [s] what occupies the path within this time is there already

@@ -6,12 +6,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from dvca_sumo.geometry.boxes import corners
-from dvca_sumo.messages import Integers, VehicleShape
+from dvca_sumo.messages import Flags, Integers, VehicleShape
 from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.exits import Ahead, ahead, is_blocked
 from dvca_sumo.stack.planning.junctions import LineView
-from dvca_sumo.stack.planning.scene import Flags
 from dvca_sumo.stack.planning.speed import Stop
 from dvca_sumo.stack.planning.st_graph import Graph
 
