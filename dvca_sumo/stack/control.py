@@ -75,7 +75,11 @@ def _place(knots: list[float], value: float) -> Place:
     start = knots[i]
     width = knots[i + 1] - start
     share = (value - start) / width if width > 0.0 else 1.0
-    return i, (min(share, 1.0) if share > 0.0 else 0.0)
+    if share >= 1.0:
+        return i, 1.0
+    if share > 0.0:
+        return i, share
+    return i, 0.0
 
 
 def _at(place: Place, values: list[float]) -> float:
@@ -172,8 +176,10 @@ class TrackingController:
 
 def _limited(value: float, most: float) -> float:
     """The value, no farther from 0 than `most`; what is not a number counts as `-most`."""
+    if value >= most:
+        return most
     if value > -most:
-        return min(most, value)
+        return value
     return -most
 
 

@@ -108,11 +108,14 @@ class LaneFollowing:
     def find(self, tracks: Sequence[int], points: Floats, headings: Floats) -> None:
         """Looks for the lanes of the objects that have none: (n,), (n, 2), (n,)."""
         wanted = []
-        for row, (track, (x, y)) in enumerate(zip(tracks, points.tolist(), strict=True)):
+        for row, track in enumerate(tracks):
             anchor = self._anchors.get(track)
             if anchor is None:
                 anchor = self._anchors[track] = _Anchor()
-            if not anchor.places and math.hypot(x - anchor.x, y - anchor.y) >= self._config.retry_distance:
+            if anchor.places:
+                continue
+            x, y = points[row].tolist()
+            if math.hypot(x - anchor.x, y - anchor.y) >= self._config.retry_distance:
                 anchor.x, anchor.y = x, y
                 wanted.append(row)
         if not wanted:

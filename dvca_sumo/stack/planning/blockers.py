@@ -84,7 +84,7 @@ def blockers(
     """
     walks = _walks_along(scene)
     passed = scene.is_standing | walks
-    if not passed.any() and not held:
+    if not np.count_nonzero(passed) and not held:
         return [], _NOBODY
     wanted = np.where(scene.classes == _PERSON, config.person_clearance, config.nudge_clearance)
     limits = wanted
@@ -94,7 +94,7 @@ def blockers(
         limits = wanted + config.nudge_hold * is_held
         passed |= is_held & _is_too_near(speeds, speed, scene, shape, config)
     near = passed & _may_be_passed_closer(limits, scene, window, shape)
-    if not near.any():
+    if not np.count_nonzero(near):
         return [], _NOBODY
     beside = _beside(scene, window, near | scene.is_standing)
     near &= beside.clearances(0.0) < limits
@@ -135,9 +135,10 @@ def _is_too_near(speeds: Floats, speed: float, scene: Scene, shape: VehicleShape
 def _may_be_passed_closer(limits: Floats, scene: Scene, window: Window, shape: VehicleShape) -> Flags:
     """Which objects (n,) on the way ahead, going by their extents, may be closer than `limits` (n,) [m]."""
     now, rows = scene.now, scene.rows_now
-    swept_left, swept_right = window.swept_left[rows].max(axis=0), window.swept_right[rows].min(axis=0)
+    swept_left = np.maximum.reduce(window.swept_left.take(rows))
+    swept_right = np.minimum.reduce(window.swept_right.take(rows))
     # Over its half length the line bends away from a body, over the ego's length the swept edge away from the line.
-    bend = 0.5 * float(np.abs(window.curvatures).max())
+    bend = 0.5 * float(np.maximum.reduce(np.abs(window.curvatures)))
     doubt = bend * (now.half_lengths * now.half_lengths + shape.length * shape.length) + _LEAST_DOUBT
     near: Flags = now.gaps(swept_left, swept_right) < limits + np.minimum(doubt, _DOUBT)
     near &= now.stations + now.half_lengths > -shape.rear_overhang - LENGTHWISE

@@ -22,6 +22,8 @@ def kept(
     On those the ego passes who leaves it room there, but none at the offset of a nudge; or none, of who is ahead, at
     its own, `lateral` to the line.
     """
+    if not standing.low.size:
+        return list(nudges)
     least = config.nudge_clearance_least
     begins, ends = standing.low - shape.front, standing.high + shape.rear_overhang
     in_way = np.zeros(len(standing.low), dtype=np.bool_)

@@ -80,13 +80,14 @@ def _slow_stretches(
     Near is also the nose of who may set off. Past a line of others the ego feels its way until it sees by who waits
     beside: it looks from the middle of its body.
     """
-    front, rear = graph.low[:, 0] - shape.front, graph.high[:, 0] + shape.rear_overhang
+    low, high = graph.low[:, 0], graph.high[:, 0]
     for row, cap, room in _passing_speeds(graph, config):
-        yield front[row] - room, rear[row], cap
+        yield low[row] - shape.front - room, high[row] + shape.rear_overhang, cap
     for row in _waiting(graph, views):
-        yield front[row] - _ROOM_TO_STOP, rear[row], _BEFORE_WAITING
+        yield low[row] - shape.front - _ROOM_TO_STOP, high[row] + shape.rear_overhang, _BEFORE_WAITING
     for row in _at_kerbs(speed, graph, views, crossings, config):
-        yield front[row] - _OUTLOOK, graph.high[row, 0] - shape.front, _AT_KERB if speed < _UNHURRIED else _BEFORE_PRIOR
+        cap = _AT_KERB if speed < _UNHURRIED else _BEFORE_PRIOR
+        yield low[row] - shape.front - _OUTLOOK, high[row] - shape.front, cap
     for view in views:
         distance = view.distance
         if not view.goes_first or view.line.control is _PRIORITY:
@@ -109,7 +110,7 @@ def _waiting(graph: Graph, views: list[LineView]) -> list[int]:
     """
     scene = graph.scene
     prior = frozenset().union(*(view.goes_first for view in views if view.line.control is not Control.SIGNAL))
-    rows = [row for row in range(scene.moving, len(scene.lanes)) if not prior.isdisjoint(scene.lanes[row])]
+    rows = [row for row in range(scene.moving, len(scene.lanes)) if prior and not prior.isdisjoint(scene.lanes[row])]
     if not rows:
         return []
     boxes, gaps, futures = scene.boxes[scene.owners[rows]], graph.gaps[rows, 0], scene.futures
@@ -125,10 +126,10 @@ def _at_kerbs(
 ) -> list[int]:
     """Rows of people who stand beside a crossing ahead, and may use it before an ego of such a `speed` [m/s]."""
     scene, still = graph.scene, slice(graph.scene.moving, None)
-    gaps = graph.gaps[still, 0]
-    stands = scene.is_person[still] & (gaps > 0.0) & (gaps < config.crossing_margin)
-    if not stands.any():
+    people, gaps = scene.is_person[still], graph.gaps[still, 0]
+    if not np.count_nonzero(people):
         return []
+    stands = people & (gaps > 0.0) & (gaps < config.crossing_margin)
     places = scene.futures.stations[still, 0] + graph.window.station
     waits = np.zeros_like(stands)
     for crossing in _in_use(speed, views, crossings):
@@ -157,8 +158,9 @@ def _hiding(graph: Graph, line: float) -> float:
     They hide what comes, and may have seen it. Both are arcs of the path [m]; minus infinity where nobody does.
     """
     scene, stations = graph.scene, graph.scene.futures.stations
-    speeds = np.diff(stations, prepend=np.nan) / PREDICTION_STEP
+    speeds = np.empty(stations.shape)
     speeds[:, 0] = scene.speeds[scene.owners]
+    speeds[:, 1:] = (stations[:, 1:] - stations[:, :-1]) / PREDICTION_STEP
     is_slow = speeds < _SLOWED
     rows, first = np.arange(len(stations)), is_slow.argmax(axis=1)
     gaps, noses = graph.gaps[rows, first], graph.high[rows, first]

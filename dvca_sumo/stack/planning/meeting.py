@@ -166,11 +166,12 @@ class Meetings:
         """
         scene = graph.scene
         passes = self._is_gone(scene.times - margin, rows, graph, profile)
-        if not passes.any():
+        if not np.count_nonzero(passes):
             return passes
         speeds = scene.speeds[scene.owners[rows]]
-        ways = np.hypot(np.diff(scene.futures.stations[rows]), np.diff(scene.futures.offsets[rows])).cumsum(axis=1)
-        times = np.broadcast_to(scene.times, (len(rows), len(scene.times))).copy()
+        stations, offsets = scene.futures.stations[rows], scene.futures.offsets[rows]
+        ways = np.hypot(stations[:, 1:] - stations[:, :-1], offsets[:, 1:] - offsets[:, :-1]).cumsum(axis=1)
+        times = np.tile(scene.times, (len(rows), 1))
         keeps = speeds > self._config.standing_speed
         times[keeps, 1:] = np.minimum(times[keeps, 1:], ways[keeps] / speeds[keeps, None])
         return passes & self._is_gone(times - max(margin - _SLOWS, 0.0), rows, graph, profile)

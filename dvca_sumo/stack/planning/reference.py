@@ -99,7 +99,9 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         nearest = squares.argmin(axis=1) * _NODES
         ahead, across, curvatures, _ = self._seen(points, nearest)
         rough = ahead / np.maximum(1.0 - curvatures * across, _NEAREST_CENTRE)
-        rows = np.rint(nearest + np.minimum(np.maximum(rough, -_NODES), _NODES))
+        rows = np.minimum(np.maximum(rough, -_NODES, out=rough), _NODES, out=rough)
+        rows += nearest
+        np.rint(rows, out=rows)
         np.minimum(np.maximum(rows, 0.0, out=rows), self.rows.shape[1] - 1.0, out=rows)
         ahead, across, curvatures, headings = self._seen(points, rows.astype(np.int64))
         scale = np.maximum(1.0 - curvatures * across, _NEAREST_CENTRE)

@@ -126,7 +126,8 @@ def roll_out(
         arcs.append(s)
         speeds.append(v)
         accelerations.append(a)
-    return Profile(np.array(arcs), np.array(speeds), np.array(accelerations), label)
+    motion = np.array((arcs, speeds, accelerations))
+    return Profile(motion[0], motion[1], motion[2], label)
 
 
 def _for_stop(stop: Stop, s: float, v: float, time: float, config: PlanningConfig) -> float:

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.boxes import outlines
-from dvca_sumo.messages import PREDICTION_STEP, Flags, Floats, Integers, ObjectClass, VehicleShape
+from dvca_sumo.messages import PREDICTION_STEP, PREDICTION_TIMES, Flags, Floats, Integers, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Crossing, Overpass, Route
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Path
@@ -17,6 +17,7 @@ AT_CROSSING = 1.5  # [m] before and after a pedestrian crossing
 
 _BICYCLE, _PERSON = int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 _WALKS_ACROSS = 0.3  # [m/s] sideways
+_COLUMNS = np.arange(len(PREDICTION_TIMES))
 _NEVER = 1e4  # [m] for places where there is no leader
 _LANE_ROOM = 0.3  # [m] of lane beside the ego's width that is enough for `trusts_lane_room`
 _DOUBT = 1.0  # [m] gaps to what stands, and overlaps, up to which its outline is looked at
@@ -278,19 +279,17 @@ def leader_of(rows: list[int], graph: Graph, shape: VehicleShape) -> Leader | No
     """
     if not rows:
         return None
-    scene, low = graph.scene, graph.low[rows]
-    count = low.shape[1]
-    columns, first = np.arange(count), np.array([graph.first[row] for row in rows])
-    comes = (scene.futures.directions[rows, 0] < 0.0) & (scene.times[first] <= PRESENT)
-    is_there = graph.occupied[rows] | (comes[:, None] & (columns < first[:, None]))
+    scene, those = graph.scene, np.array(rows)
+    low, first = graph.low[those], np.array([graph.first[row] for row in rows])
+    comes = (scene.futures.directions[those, 0] < 0.0) & (scene.times[first] <= PRESENT)
+    is_there = graph.occupied[those] | (comes[:, None] & (first[:, None] > _COLUMNS))
     places = np.where(is_there, low - shape.front, _NEVER)
     nearest = places.argmin(axis=0)
-    ends = np.minimum(columns + 1, count - 1)
-    rears, speeds, times = np.empty(count + 1), np.empty(count + 1), np.empty(count + 1)
-    rears[:-1] = places[nearest, columns]
-    speeds[:-1] = (low[nearest, ends] - low[nearest, ends - 1]) / PREDICTION_STEP
+    rears, speeds, times = np.empty((3, len(nearest) + 1))
+    rears[:-1] = places[nearest, _COLUMNS]
+    speeds[:-2] = (low[nearest[:-1], _COLUMNS[1:]] - low[nearest[:-1], _COLUMNS[:-1]]) / PREDICTION_STEP
+    speeds[-2:] = (low[nearest[-1], -1] - low[nearest[-1], -2]) / PREDICTION_STEP
     times[:-1], times[-1] = scene.times, STEP_TIMES[-1]
-    speeds[-1] = speeds[-2]
     rears[-1] = rears[-2] + (times[-1] - times[-2]) * speeds[-1]
     track = graph.track(rows[nearest[(rears < _NEVER).argmax()]])
     return Leader(

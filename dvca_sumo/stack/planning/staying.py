@@ -25,13 +25,16 @@ class Staying:
 
     def see(self, situation: Situation) -> None:
         """Take in the next cycle's scene."""
-        scene = situation.scene
-        standing = [scene.ids[row] for row in scene.is_standing.nonzero()[0].tolist()]
-        moving = [scene.ids[row] for row in (~scene.is_standing).nonzero()[0].tolist()]
-        self.since = {track: self.since.get(track, situation.time) for track in standing}
-        self._moving = {track: self._moving.get(track, situation.time) for track in moving}
-        self._driven &= set(scene.ids)
-        self._driven.update(track for track, since in self._moving.items() if situation.time - since > _DRIVING)
+        ids, time = situation.scene.ids, situation.time
+        stood, moved = self.since, self._moving
+        self.since, self._moving = {}, {}
+        for track, is_standing in zip(ids, situation.scene.is_standing.tolist(), strict=True):
+            if is_standing:
+                self.since[track] = stood.get(track, time)
+            else:
+                self._moving[track] = moved.get(track, time)
+        self._driven.intersection_update(ids)
+        self._driven.update(track for track, since in self._moving.items() if time - since > _DRIVING)
 
     def will_stay(self, blocker: Blocker, situation: Situation, *, is_passing: bool) -> bool:
         """Whether it has stood for so long, where it is, that it will not move by itself.
