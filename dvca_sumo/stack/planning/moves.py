@@ -21,6 +21,7 @@ _TOLERANCE = 1.1  # of curvature, so that a move found feasible is found so agai
 # what is left of such a move does not come to more than this.
 _SWINGING = 4.0
 _UNNOTICED = 1.0  # [m] of slope times length carry it 0.16 m past
+_AWAY = 0.05  # [m] that the bend of the way up to there may carry a move farther from its target first
 _SAMPLES = (0.15, 0.3, 0.5, 0.7, 0.85)
 
 _Terms = tuple[float, float, float, float, float]
@@ -77,6 +78,25 @@ def feasible_length(move: Move, speed: float, window: Window, config: PlanningCo
         else:
             return length
         length *= _STRETCH
+
+
+def turned_in(move: Move) -> Move:
+    """`move`, bent less where it begins if that would carry it farther from its target first, over all of its length.
+
+    The ego was about to follow another bend than the line's. What its slope carries away is left as it is.
+    """
+    state, target, _, length = move
+    side = math.copysign(1.0, target - state.offset)
+    away, terms = -side * state.bend, _terms(state._replace(bend=0.0), target, length)
+    if away <= 0.0:
+        return move
+    for u in _SAMPLES:
+        nearer = side * _risen(terms, u)[0]
+        if nearer < -_AWAY:
+            return move
+        # A bend of 1 and nothing else makes a quintic of u^2 (1 - u)^3 / 2, times the square of its length.
+        away = min(away, 2.0 * (nearer + _AWAY) / ((length * u) ** 2 * (1.0 - u) ** 3))
+    return move._replace(state=state._replace(bend=-side * away))
 
 
 def roomy_length(move: Move, window: Window, shape: VehicleShape) -> float:

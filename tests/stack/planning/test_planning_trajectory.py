@@ -138,6 +138,26 @@ def test_move_that_is_on_its_way_to_the_target_does_not_swing_far_past_it(far: f
     assert path.y[int(far) + 1 : int(far) + 8] == pytest.approx(0.2, abs=0.01)
 
 
+@pytest.mark.parametrize("speed", [14.0, 26.0])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_move_begun_as_the_path_so_far_bends_away_does_not_go_the_other_way_first(side: float, speed: float) -> None:
+    """Of 2.6 m/s^2, the bend would last over all of the move, and carry it a fifth of a metre there."""
+    bend = 2.6 * side / speed**2
+    window = Reference(road(), SHAPE, PlanningConfig()).window(100.0, 200.0)
+    start = StartState(100.0, 3.2 * side, 0.0, speed, 0.0, bend)
+    lateral = Lateral(3.2 * side, 0.0, bend)
+    path = path_along(window, start, lateral, [], SHAPE, PlanningConfig())
+    assert (side * path.y).max() < 3.3
+    assert abs(path.y[-1]) < 0.01
+
+
+def test_move_begun_on_the_way_out_goes_on_bending_as_it_does() -> None:
+    window = Reference(road(), SHAPE, PlanningConfig()).window(100.0, 200.0)
+    start = StartState(100.0, 1.0, 0.1, 20.0, 0.0, 0.004)
+    path = path_along(window, start, Lateral(1.0, math.tan(0.1), 0.004), [], SHAPE, PlanningConfig())
+    assert path.curvatures[0] == pytest.approx(0.004, rel=0.05)
+
+
 def test_ego_that_points_away_from_the_line_is_led_back_slowly() -> None:
     points = planner().step(believed(50.0, 6.0, 1.5, 5.0), NOBODY, {}).points
     assert points[-1, 4] < PlanningConfig().astray_speed + 0.1
