@@ -80,16 +80,17 @@ def feasible_length(move: Move, speed: float, window: Window, config: PlanningCo
         length *= _STRETCH
 
 
-def turned_in(move: Move) -> Move:
+def bent_less(move: Move) -> Move:
     """`move`, bent less where it begins if that would carry it farther from its target first, over all of its length.
 
     The ego was about to follow another bend than the line's. What its slope carries away is left as it is.
     """
     state, target, _, length = move
     side = math.copysign(1.0, target - state.offset)
-    away, terms = -side * state.bend, _terms(state._replace(bend=0.0), target, length)
+    away = -side * state.bend
     if away <= 0.0:
         return move
+    terms = _terms(state._replace(bend=0.0), target, length)
     for u in _SAMPLES:
         nearer = side * _risen(terms, u)[0]
         if nearer < -_AWAY:

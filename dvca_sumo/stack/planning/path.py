@@ -9,7 +9,7 @@ import numpy as np
 
 from dvca_sumo.messages import Floats, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.moves import Lateral, Move, blend_length, feasible_length, moved, roomy_length, turned_in
+from dvca_sumo.stack.planning.moves import Lateral, Move, bent_less, blend_length, feasible_length, moved, roomy_length
 from dvca_sumo.stack.planning.reference import BEHIND, Window, swept
 from dvca_sumo.stack.planning.start import StartState
 
@@ -153,5 +153,5 @@ def _moves(
         position = max(plateau.end, begin + move.length)
         state, unsettled = Lateral(plateau.offset, 0.0, 0.0), 0.0
     moves.append(way_back(state, position, speed, window, shape, config))
-    moves[0] = turned_in(moves[0])
+    moves[0] = bent_less(moves[0])
     return moves
