@@ -8,10 +8,9 @@ import math
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from dvca_sumo.geometry.angles import wrapped_all
-from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, PredictedObjects, TrackedObjects
+from dvca_sumo.messages import PREDICTION_TIMES, Flags, Floats, Integers, ObjectClass, PredictedObjects, TrackedObjects
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.continuations import Traffic
 from dvca_sumo.stack.hypotheses import Hypotheses, message_of
@@ -172,7 +171,7 @@ def _told_apart(hypotheses: Hypotheses) -> Hypotheses:
     return Hypotheses(owners[kept], sums[kept], poses[kept], [lanes[row] for row in kept])
 
 
-def _is_wheeled(tracked: TrackedObjects) -> npt.NDArray[np.bool_]:
+def _is_wheeled(tracked: TrackedObjects) -> Flags:
     classes = tracked.classes
-    wheeled: npt.NDArray[np.bool_] = (classes == _VEHICLE) | (classes == _BICYCLE)
+    wheeled: Flags = (classes == _VEHICLE) | (classes == _BICYCLE)
     return wheeled

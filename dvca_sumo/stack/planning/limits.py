@@ -110,7 +110,7 @@ def _waiting(graph: Graph, views: list[LineView]) -> list[int]:
     """
     scene = graph.scene
     prior = frozenset().union(*(view.goes_first for view in views if view.line.control is not Control.SIGNAL))
-    rows = [row for row in range(scene.moving, len(scene.lanes)) if prior and not prior.isdisjoint(scene.lanes[row])]
+    rows = [row for row in range(scene.moving, len(scene.lanes)) if not prior.isdisjoint(scene.lanes[row])]
     if not rows:
         return []
     boxes, gaps, futures = scene.boxes[scene.owners[rows]], graph.gaps[rows, 0], scene.futures
