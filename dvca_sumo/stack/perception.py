@@ -12,7 +12,8 @@ import numpy as np
 from dvca_sumo.geometry.angles import wrapped_all
 from dvca_sumo.messages import Flags, Floats, Integers, LocalizationEstimate, ObjectClass, SignalColour, TrackedObjects
 from dvca_sumo.stack.protocols import Detections
-from dvca_sumo.stack.tracks import Measurements, MotionConfig, Tracks
+from dvca_sumo.stack.tracks import LAST_ON_WHEELS, Measurements, MotionConfig, Tracks
+from dvca_sumo.stack.visibility import are_hidden
 
 _STATIC = int(ObjectClass.STATIC)  # numpy compares with a plain number ten times as fast
 
@@ -27,9 +28,14 @@ class PerceptionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     gate: float = 13.8  # squared Mahalanobis distance of the worst match (chi2, 2 dof, 99.9 %)
     class_penalty: float = 4.0  # added to the squared distance where track and detection differ in class
     stride: float = 0.75  # [m] that a body, however narrow, may be from where it is expected: people step aside
+    lane_step: float = 4.2  # [m] the same for what drives: SUMO's vehicles change lanes from one step to the next ...
+    lane_step_turn: float = 0.35  # [rad] ... and keep their heading ...
+    lane_step_speed: float = 1.5  # [m/s] ... and their speed, within these
     confirming_hits: int = 2  # hits that confirm a track ...
     confirming_sweeps: int = 3  # ... within its first sweeps; else it is dropped
-    coast_time: float = 0.8  # [s] a confirmed track lives on without being seen
+    coast_time: float = 0.8  # [s] a confirmed track lives on without being seen ...
+    hidden_time: float = 2.4  # [s] ... and where something hides it
+    hiding_width: float = 1.0  # [m] of what hides others
     still_speed: float = 0.25  # [m/s] slower tracks are reported at rest
     signal_hold: float = 0.3  # [s] a signal head not read keeps what it showed
 
@@ -57,7 +63,7 @@ class Tracker:
         self._time = time
         if math.isfinite(localization.x + localization.y + localization.heading):
             self._absorb(self._placed(detections, localization), time)
-        confirmed = self._live_and_die(time)
+        confirmed = self._live_and_die(detections, localization)
         return self._told(confirmed, self._held_signals(detections.signals, time), time)
 
     def _placed(self, detections: Detections, localization: LocalizationEstimate) -> Measurements:
@@ -104,29 +110,53 @@ class Tracker:
     def _displaced(self, rows: Integers, matches: Integers, found: Measurements) -> tuple[Integers, Integers]:
         """Of the tracks and measurements left by the pairs, those within half the width of what was found, or a stride.
 
-        What is gone from one place, and there so near to it, has moved as it is not expected to, and would go on as
-        two.
+        What drives may be a lane farther. What is gone from one place, and there so near to it, has moved as it is not
+        expected to, and would go on as two.
         """
         tracks = self._tracks
         lost, new = _others(rows, tracks.ids.size), _others(matches, found.classes.size)
         dx = tracks.means[lost, 0, None] - found.boxes[new, 0]
         dy = tracks.means[lost, 1, None] - found.boxes[new, 1]
         reaches = np.maximum(0.5 * found.boxes[new, 4], self._config.stride)
+        reaches = np.where(self._drive_alike(lost, new, found), self._config.lane_step, reaches)
         again, seen = mutual_nearest((dx * dx + dy * dy) / (reaches * reaches), 1.0)
         return lost[again], new[seen]
 
-    def _live_and_die(self, time: float) -> Flags:
+    def _drive_alike(self, lost: Integers, new: Integers, found: Measurements) -> Flags:
+        """Which of the tracks `lost` (k,) and measurements `new` (n,) roll on with one heading and speed: (k, n)."""
+        config, tracks = self._config, self._tracks
+        velocities = tracks.means[lost, 2:]
+        faster = velocities @ found.directions[new].T - found.radial_speeds[new]
+        turned = wrapped_all(tracks.forms[lost, 0, None] - found.boxes[new, 2])
+        drives = np.hypot(velocities[:, 0], velocities[:, 1]) > config.motion.moving_speed
+        drives &= tracks.classes[lost] <= LAST_ON_WHEELS
+        alike: Flags = (np.abs(faster) < config.lane_step_speed) & (np.abs(turned) < config.lane_step_turn)
+        alike &= drives[:, None] & (found.classes[new] <= LAST_ON_WHEELS)
+        return alike
+
+    def _live_and_die(self, detections: Detections, localization: LocalizationEstimate) -> Flags:
         """Drop what was lost or never confirmed; of the rest, which are confirmed."""
         config, tracks = self._config, self._tracks
         # Enough hits means enough of them in time: a track without is dropped when its first sweeps are over.
         confirmed = tracks.hits >= config.confirming_hits
-        alive = np.where(
-            confirmed, time - tracks.last_hits <= config.coast_time + 1e-6, tracks.sweeps < config.confirming_sweeps
-        )
+        unseen = detections.time - tracks.last_hits - 1e-6
+        alive = np.where(confirmed, unseen <= config.coast_time, tracks.sweeps < config.confirming_sweeps)
+        rest = (confirmed & ~alive & (unseen <= config.hidden_time)).nonzero()[0]
+        if rest.size:
+            alive[rest] = self._hidden(rest, detections, localization)
         if np.count_nonzero(alive) < len(alive):
             tracks.keep(alive)
             confirmed = confirmed[alive]
         return confirmed
+
+    def _hidden(self, rows: Integers, detections: Detections, localization: LocalizationEstimate) -> Flags:
+        """Which tracks are behind something that was seen just now; none while the pose is unknown (nan)."""
+        config, tracks, boxes = self._config, self._tracks, detections.boxes
+        cos, sin = math.cos(localization.heading), math.sin(localization.heading)
+        east, north = tracks.means[rows, 0] - localization.x, tracks.means[rows, 1] - localization.y
+        centres = np.stack([cos * east + sin * north, cos * north - sin * east], axis=1)
+        hides = np.minimum(boxes[:, 3], boxes[:, 4]) >= config.hiding_width
+        return are_hidden(centres, boxes[hides], tracks.forms[rows, 1])
 
     def _told(self, confirmed: Flags, signals: dict[str, SignalColour], time: float) -> TrackedObjects:
         tracks, rows = self._tracks, confirmed.nonzero()[0]

@@ -11,7 +11,7 @@ from dvca_sumo.geometry.angles import wrapped_all
 from dvca_sumo.messages import Flags, Floats, Integers, ObjectClass
 
 _CLASSES = len(ObjectClass)
-_LAST_ON_WHEELS = int(ObjectClass.BICYCLE)  # vehicles and bicycles, by class number, move along their heading only
+LAST_ON_WHEELS = int(ObjectClass.BICYCLE)  # vehicles and bicycles, by class number, move along their heading only
 _STATE = np.eye(4)  # x, y, vx, vy
 
 
@@ -91,7 +91,7 @@ class Tracks:
         """Kalman update by position, radial speed and, for what rolls, no velocity across the heading."""
         count = len(rows)
         headings = found.boxes[:, 2]
-        rolls = self.classes[rows] <= _LAST_ON_WHEELS
+        rolls = self.classes[rows] <= LAST_ON_WHEELS
         observation = np.zeros((count, 4, 4))
         observation[:, 0, 0] = observation[:, 1, 1] = 1.0
         observation[:, 2, 2:] = found.directions
@@ -153,7 +153,7 @@ class Tracks:
         """
         priors = self._first_variances[found.classes]
         along = np.stack([np.cos(found.boxes[:, 2]), np.sin(found.boxes[:, 2])], axis=1)
-        rolls = (found.classes <= _LAST_ON_WHEELS)[:, None, None]
+        rolls = (found.classes <= LAST_ON_WHEELS)[:, None, None]
         sideways = self._config.sideways_sigma**2 * np.eye(2)
         prior = priors[:, None, None] * np.where(rolls, along[:, :, None] * along[:, None, :], np.eye(2)) + sideways
         cross = (prior @ found.directions[:, :, None])[:, :, 0]

@@ -130,6 +130,46 @@ def test_who_comes_up_farther_than_a_stride_from_one_who_is_gone_is_another() ->
     assert messages[-1].ids.tolist() == [2]
 
 
+def test_a_car_that_is_on_the_next_lane_from_one_sweep_to_the_next_stays_the_same_and_leaves_nothing_behind() -> None:
+    messages = tracked([[car(20 + k, 0, 10.0)] for k in range(6)] + [[car(26 + k, 3.2, 10.0)] for k in range(6)])
+    assert all(message.ids.tolist() == [1] for message in messages[1:])
+    npt.assert_allclose(messages[6].boxes[0, :2], [26.0, 3.2], atol=0.1)
+    for message in messages[6:]:
+        npt.assert_allclose(message.velocities[0], (10.0, 0.0), atol=0.1)
+
+
+@pytest.mark.parametrize(
+    "beside",
+    [car(26, 3.2, 14.0), car(26, 3.2, 10.0, heading=0.6), car(26, 4.5, 10.0)],
+    ids=["faster", "turned", "two lanes over"],
+)
+def test_a_car_that_comes_up_beside_one_that_is_gone_is_another(beside: Thing) -> None:
+    messages = tracked([[car(20 + k, 0, 10.0)] for k in range(6)] + [[beside], [beside]])
+    assert messages[6].ids.tolist() == [1]
+    npt.assert_allclose(messages[6].boxes[0, :2], [26.0, 0.0], atol=0.1)
+
+
+def test_a_car_that_comes_up_beside_one_that_stood_and_is_gone_is_another() -> None:
+    messages = tracked([[car(20, 0)]] * 6 + [[car(20, 3.2)]] * 2)
+    assert messages[-1].ids.tolist() == [1, 2]
+
+
+def last_told(messages: list[TrackedObjects], track: int) -> float:
+    return [message.time for message in messages if track in message.ids.tolist()][-1]
+
+
+def test_what_something_hides_is_known_of_for_longer_and_comes_back_as_itself() -> None:
+    van, seen = car(10, 0), [[car(10, 0), car(40, -4 + k, 10.0, math.pi / 2)] for k in range(3)]
+    assert last_told(tracked(seen + [[van]] * 40), 2) == pytest.approx(0.2 + 0.8)  # its way leads out of hiding
+    standing = [[van, car(30, 0)]] * 5
+    assert last_told(tracked(standing + [[van]] * 40), 2) == pytest.approx(0.4 + 2.4)
+    assert tracked(standing + [[van]] * 20 + standing)[-1].ids.tolist() == [1, 2]
+
+
+def test_people_hide_nobody() -> None:
+    assert last_told(tracked([[walker(10, 0), car(30, 0)]] * 5 + [[walker(10, 0)]] * 40), 2) == pytest.approx(0.4 + 0.8)
+
+
 def test_pedestrians_who_cross_each_others_way_keep_their_ids() -> None:
     scenes = [[walker(15, -3 + 0.14 * k, 0, 1.4), walker(15.6, 3 - 0.14 * k, 0, -1.4)] for k in range(43)]
     messages = tracked(scenes)
