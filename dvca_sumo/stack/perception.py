@@ -13,7 +13,6 @@ from dvca_sumo.geometry.angles import wrapped_all
 from dvca_sumo.messages import Flags, Floats, Integers, LocalizationEstimate, ObjectClass, SignalColour, TrackedObjects
 from dvca_sumo.stack.protocols import Detections
 from dvca_sumo.stack.tracks import LAST_ON_WHEELS, Measurements, MotionConfig, Tracks
-from dvca_sumo.stack.visibility import are_hidden
 
 _STATIC = int(ObjectClass.STATIC)  # numpy compares with a plain number ten times as fast
 
@@ -33,9 +32,7 @@ class PerceptionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     lane_step_speed: float = 1.5  # [m/s] ... and their speed, within these
     confirming_hits: int = 2  # hits that confirm a track ...
     confirming_sweeps: int = 3  # ... within its first sweeps; else it is dropped
-    coast_time: float = 0.8  # [s] a confirmed track lives on without being seen ...
-    hidden_time: float = 2.4  # [s] ... and where something hides it
-    hiding_width: float = 1.0  # [m] of what hides others
+    coast_time: float = 0.8  # [s] a confirmed track lives on without being seen
     still_speed: float = 0.25  # [m/s] slower tracks are reported at rest
     signal_hold: float = 0.3  # [s] a signal head not read keeps what it showed
 
@@ -63,7 +60,7 @@ class Tracker:
         self._time = time
         if math.isfinite(localization.x + localization.y + localization.heading):
             self._absorb(self._placed(detections, localization), time)
-        confirmed = self._live_and_die(detections, localization)
+        confirmed = self._live_and_die(time)
         return self._told(confirmed, self._held_signals(detections.signals, time), time)
 
     def _placed(self, detections: Detections, localization: LocalizationEstimate) -> Measurements:
@@ -134,29 +131,18 @@ class Tracker:
         alike &= drives[:, None] & (found.classes[new] <= LAST_ON_WHEELS)
         return alike
 
-    def _live_and_die(self, detections: Detections, localization: LocalizationEstimate) -> Flags:
+    def _live_and_die(self, time: float) -> Flags:
         """Drop what was lost or never confirmed; of the rest, which are confirmed."""
         config, tracks = self._config, self._tracks
         # Enough hits means enough of them in time: a track without is dropped when its first sweeps are over.
         confirmed = tracks.hits >= config.confirming_hits
-        unseen = detections.time - tracks.last_hits - 1e-6
-        alive = np.where(confirmed, unseen <= config.coast_time, tracks.sweeps < config.confirming_sweeps)
-        rest = (confirmed & ~alive & (unseen <= config.hidden_time)).nonzero()[0]
-        if rest.size:
-            alive[rest] = self._hidden(rest, detections, localization)
+        alive = np.where(
+            confirmed, time - tracks.last_hits <= config.coast_time + 1e-6, tracks.sweeps < config.confirming_sweeps
+        )
         if np.count_nonzero(alive) < len(alive):
             tracks.keep(alive)
             confirmed = confirmed[alive]
         return confirmed
-
-    def _hidden(self, rows: Integers, detections: Detections, localization: LocalizationEstimate) -> Flags:
-        """Which tracks are behind something that was seen just now; none while the pose is unknown (nan)."""
-        config, tracks, boxes = self._config, self._tracks, detections.boxes
-        cos, sin = math.cos(localization.heading), math.sin(localization.heading)
-        east, north = tracks.means[rows, 0] - localization.x, tracks.means[rows, 1] - localization.y
-        centres = np.stack([cos * east + sin * north, cos * north - sin * east], axis=1)
-        hides = np.minimum(boxes[:, 3], boxes[:, 4]) >= config.hiding_width
-        return are_hidden(centres, boxes[hides], tracks.forms[rows, 1])
 
     def _told(self, confirmed: Flags, signals: dict[str, SignalColour], time: float) -> TrackedObjects:
         tracks, rows = self._tracks, confirmed.nonzero()[0]

@@ -52,11 +52,8 @@ def visible_shares(boxes: Floats, occluder_width: float) -> Floats:
     return shares
 
 
-def are_hidden(points: Floats, boxes: Floats, margin: float | Floats) -> Flags:
-    """Which `points` (k, 2) lie more than `margin` [m], or their own of (k,), behind the near side of a box: (k,).
-
-    `boxes` are (n, 5).
-    """
+def are_hidden(points: Floats, boxes: Floats, margin: float) -> Flags:
+    """Which `points` (k, 2) lie more than `margin` [m] behind the near side of one of the `boxes` (n, 5): (k,)."""
     bearings = np.arctan2(points[:, 1], points[:, 0])
     entries = _entries(boxes, bearings[None])
     hidden: Flags = np.any(entries < np.hypot(points[:, 0], points[:, 1]) - margin, axis=0)

@@ -154,22 +154,6 @@ def test_a_car_that_comes_up_beside_one_that_stood_and_is_gone_is_another() -> N
     assert messages[-1].ids.tolist() == [1, 2]
 
 
-def last_told(messages: list[TrackedObjects], track: int) -> float:
-    return [message.time for message in messages if track in message.ids.tolist()][-1]
-
-
-def test_what_something_hides_is_known_of_for_longer_and_comes_back_as_itself() -> None:
-    van, seen = car(10, 0), [[car(10, 0), car(40, -4 + k, 10.0, math.pi / 2)] for k in range(3)]
-    assert last_told(tracked(seen + [[van]] * 40), 2) == pytest.approx(0.2 + 0.8)  # its way leads out of hiding
-    standing = [[van, car(30, 0)]] * 5
-    assert last_told(tracked(standing + [[van]] * 40), 2) == pytest.approx(0.4 + 2.4)
-    assert tracked(standing + [[van]] * 20 + standing)[-1].ids.tolist() == [1, 2]
-
-
-def test_people_hide_nobody() -> None:
-    assert last_told(tracked([[walker(10, 0), car(30, 0)]] * 5 + [[walker(10, 0)]] * 40), 2) == pytest.approx(0.4 + 0.8)
-
-
 def test_pedestrians_who_cross_each_others_way_keep_their_ids() -> None:
     scenes = [[walker(15, -3 + 0.14 * k, 0, 1.4), walker(15.6, 3 - 0.14 * k, 0, -1.4)] for k in range(43)]
     messages = tracked(scenes)
