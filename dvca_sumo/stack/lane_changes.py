@@ -63,7 +63,7 @@ class LaneChanges:
         if not rows:
             return candidates, drift
         owners = candidates.owners[rows]
-        places = self._paths.project(stretches_of(paths), np.array(guesses), tracked.boxes[owners, :2])
+        places = self._paths.place(stretches_of(paths), np.array(guesses), tracked.boxes[owners])
         changes = Candidates(owners, paths, likely[rows], places).chosen(np.flatnonzero(places.beyond == 0.0))
         kept = np.ones(len(tracked.ids))
         kept[changes.owners] -= changes.probabilities

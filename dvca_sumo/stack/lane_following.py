@@ -55,7 +55,7 @@ class Movers(NamedTuple):
     rows: Integers  # (n,) object rows, ascending
     tracks: list[int]  # (n,)
     traffic: list[Traffic]  # (n,)
-    points: Floats  # (n, 2)
+    boxes: Floats  # (n, 5)
     headings: Floats  # (n,) [rad] directions of motion
     moved: Floats  # (n,) [m] since they were last seen
     reaches: Floats  # (n,) [m] how far they may get
@@ -67,7 +67,7 @@ class Movers(NamedTuple):
             self.rows[chosen],
             tracks,
             [self.traffic[i] for i in chosen],
-            self.points[chosen],
+            self.boxes[chosen],
             self.headings[chosen],
             np.zeros(len(chosen)),
             self.reaches[chosen],
@@ -132,7 +132,7 @@ class LaneFollowing:
         for i in lost:
             self._anchors[movers.tracks[i]] = _Anchor()
         again = movers.again(lost)
-        self.find(again.tracks, again.points, again.headings)
+        self.find(again.tracks, again.boxes[:, :2], again.headings)
         more, _ = self._followed(again)
         return joined(found, more)
 
@@ -151,7 +151,7 @@ class LaneFollowing:
                     priors.append(probability)
                     guesses.append(station)
         objects = np.array(owners, dtype=np.int64)
-        places = self._paths.project(stretches_of(paths), np.array(guesses), movers.points[objects])
+        places = self._paths.place(stretches_of(paths), np.array(guesses), movers.boxes[objects])
         config = self._config
         errors = wrapped_all(movers.headings[objects] - places.headings)
         fits = (

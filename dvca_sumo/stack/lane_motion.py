@@ -16,7 +16,7 @@ class MotionModelConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True)
 
     trend_duration: float = 2.0  # [s] acceleration or braking seen now goes on for so long
     speeding: float = 1.1  # traffic drives up to so many times the limit, or as it does now where that is more
-    bend_acceleration: float = 3.0  # [m/s^2] lateral, in bends
+    bend_acceleration: float = 5.5  # [m/s^2] lateral, in bends; netconvert limits speeds on junctions by as much
     brisk: float = 1.5  # who is faster in a bend now is so in the next ones too, up to so many times
     braking: float = 2.5  # [m/s^2] for bends and lower limits
     settling_time: float = 3.0  # [s] to the lane's centre

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from dvca_sumo.geometry.angles import wrapped_all
 from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap
@@ -52,13 +53,14 @@ class Stretches(NamedTuple):
 
 
 class Placements(NamedTuple):
-    """Points seen from paths, one row each."""
+    """Bodies seen from paths, one row each."""
 
-    stations: Floats  # (h,) [m]
-    offsets: Floats  # (h,) [m] to the left
-    headings: Floats  # (h,) [rad] of the path there
-    half_widths: Floats  # (h,) [m] of the lane there
-    beyond: Floats  # (h,) [m] how far outside the searched stretch the point lies, 0 within
+    stations: Floats  # (h,) [m] half a length along the path behind the nose
+    offsets: Floats  # (h,) [m] to the left of a body there that follows the path
+    headings: Floats  # (h,) [rad] of that body
+    steering: Floats  # (h,) [rad] from the body seen to the path at its nose
+    half_widths: Floats  # (h,) [m] of the lane at the nose
+    beyond: Floats  # (h,) [m] how far outside the searched stretch the nose lies, 0 within
 
 
 class LanePaths:
@@ -86,22 +88,27 @@ class LanePaths:
             self._branches[key] = found
         return found
 
-    def project(self, paths: Stretches, guesses: Floats, points: Floats) -> Placements:
-        """Places `points` (h, 2) on their paths, searched around the stations guessed (h,)."""
+    def place(self, paths: Stretches, guesses: Floats, boxes: Floats) -> Placements:
+        """Places `boxes` (h, 5) on their paths, searched around the stations guessed (h,).
+
+        It is their noses that are sought: in a bend, the middle of what follows a path is beside it.
+        """
         first, last = paths
-        searched = (np.rint(guesses).astype(np.int64) + first)[:, None] + _WINDOW
+        halves, bearings = 0.5 * boxes[:, 3], boxes[:, 2]
+        noses = boxes[:, :2] + halves[:, None] * np.stack((np.cos(bearings), np.sin(bearings)), axis=1)
+        searched = (np.rint(guesses + halves).astype(np.int64) + first)[:, None] + _WINDOW
         searched = np.minimum(np.maximum(searched, first[:, None]), last[:, None])
         x, y = self._table[: _Y + 1].take(searched, axis=1)
-        x, y = points[:, :1] - x, points[:, 1:] - y
+        x, y = noses[:, :1] - x, noses[:, 1:] - y
         nearest = searched[np.arange(len(searched)), (x * x + y * y).argmin(axis=1)]
-        x, y, headings, half_widths = self._table[: _HALF_WIDTH + 1].take(nearest, axis=1)
-        x, y = points[:, 0] - x, points[:, 1] - y
-        cosines, sines = np.cos(headings), np.sin(headings)
-        along = x * cosines + y * sines
-        offsets = y * cosines - x * sines
+        x, y, ahead, half_widths = self._table[: _HALF_WIDTH + 1].take(nearest, axis=1)
+        along = (noses[:, 0] - x) * np.cos(ahead) + (noses[:, 1] - y) * np.sin(ahead)
         # Columns are 1 m apart: unless the window missed it, the nearest is about half a metre away along the path.
         beyond = np.maximum(np.abs(along) - 1.0, 0.0)
-        return Placements((nearest - first) + along, offsets, headings, half_widths, beyond)
+        stations = (nearest - first) + along - halves
+        x, y, headings = self.bodies(paths, stations[:, None], boxes[:, 3])[:, :, 0]
+        offsets = (boxes[:, 1] - y) * np.cos(headings) - (boxes[:, 0] - x) * np.sin(headings)
+        return Placements(stations, offsets, headings, wrapped_all(ahead - bearings), half_widths, beyond)
 
     def caps(self, paths: Stretches, stations: Floats, count: int) -> tuple[Floats, Floats]:
         """Speeds for bends, and speed limits, at `stations` (h,) and each of `count` metres on: (h, count) each."""
@@ -111,9 +118,9 @@ class LanePaths:
         return bends, limits
 
     def bodies(self, paths: Stretches, stations: Floats, lengths: Floats) -> Floats:
-        """Poses of bodies so long (h,) that both ends follow the path, chords in its bends: x, y, headings (3, h, t).
+        """Poses of bodies so long (h,), noses on their paths, tails where these were a length before: (3, h, t).
 
-        `stations` (h, t) are those of their middles, along the path.
+        x, y and headings; `stations` (h, t) are half a length along the path behind the noses.
         """
         first, last = paths
         half = 0.5 * lengths[:, None]
@@ -128,8 +135,9 @@ class LanePaths:
         points *= shares
         points += before
         fronts, rears = points[:, :, : stations.shape[1]], points[:, :, stations.shape[1] :]
-        x, y = fronts - rears
-        return np.concatenate((0.5 * (fronts + rears), np.arctan2(y, x)[None]))
+        ways = fronts - rears
+        x, y = ways
+        return np.concatenate((fronts - half / np.hypot(x, y) * ways, np.arctan2(y, x)[None]))
 
     def _path(self, lanes: tuple[str, ...]) -> LanePath:
         found = self._paths.get(lanes)

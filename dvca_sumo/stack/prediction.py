@@ -23,6 +23,8 @@ from dvca_sumo.stack.walking import Walking, WalkingConfig
 # Comparing an array with an enumeration's member costs numpy ten times as much as with a number.
 _VEHICLE, _BICYCLE, _PERSON = int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
 
+_LEAST_COSINE = 0.4  # of the angle between a body and where its nose goes
+
 
 class PredictionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How futures are drawn up."""
@@ -35,6 +37,7 @@ class PredictionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     standing_speed: float = 0.3  # [m/s] slower vehicles stay where they are, slower people go on as they are
     direction_speed: float = 2.0  # [m/s] faster objects go where their velocity points, slower ones their box
     trend_smoothing: float = 0.5  # [s] time constant of acceleration estimates
+    straight: float = 0.2  # [rad] whose nose turns by more slows down and speeds up by turning, and shows no trend
     max_trend: float = 2.5  # [m/s^2] acceleration that is believed
     max_braking_trend: float = 4.0  # [m/s^2] braking that is believed, positive number
 
@@ -69,7 +72,7 @@ class MapPrediction:
         trends = self._trends(tracked.ids.tolist(), speeds.tolist(), elapsed)
         reaches = self._motion.reach(speeds, trends)
         candidates = self._on_lanes(tracked, speeds, reaches, elapsed)
-        parts = [self._along_lanes(tracked, candidates, speeds, trends, reaches)]
+        parts = [self._along_lanes(tracked, candidates, trends, reaches)]
         walkers = ((tracked.classes == _PERSON) & (speeds >= self._config.standing_speed)).nonzero()[0]
         if walkers.size:
             parts.append(self._walking.hypotheses(tracked, walkers))
@@ -109,7 +112,7 @@ class MapPrediction:
                 rows=moving,
                 tracks=[tracks[row] for row in moving.tolist()],
                 traffic=[*map(Traffic.of, tracked.classes[moving].tolist(), tracked.boxes[moving, 3].tolist())],
-                points=points[moving],
+                boxes=tracked.boxes[moving],
                 headings=headings[moving],
                 moved=speeds[moving] * elapsed,
                 reaches=reaches[moving],
@@ -117,22 +120,23 @@ class MapPrediction:
         )
 
     def _along_lanes(
-        self, tracked: TrackedObjects, candidates: Candidates, speeds: Floats, trends: Floats, reaches: Floats
+        self, tracked: TrackedObjects, candidates: Candidates, trends: Floats, reaches: Floats
     ) -> Hypotheses:
         """The candidates and lane changes that differ within the horizon.
 
-        Both ends of a body follow the lane. Cars seek its centre, bicycles keep their side of it.
+        A body follows its nose along the lane. Cars seek its centre, bicycles keep their side of it.
         """
         drifts = lateral_speeds(candidates, tracked.velocities)
         candidates, drifts = self._changes.added(candidates, drifts, tracked, reaches)
         owners, paths, probabilities, places = candidates
         if not len(owners):
             return Hypotheses(owners, probabilities, np.empty((0, len(PREDICTION_TIMES), 3)), [])
-        own, along = speeds[owners], stretches_of(paths)
-        stations = self._motion.travelled(along, places.stations, own, trends[owners], float(reaches[owners].max()))
+        along, boxes = stretches_of(paths), tracked.boxes.take(owners, axis=0)
+        own = self._nose_speeds(tracked.velocities[owners], boxes[:, 2], places.steering)
+        own_trends = np.where(np.abs(places.steering) <= self._config.straight, trends[owners], 0.0)
+        stations = self._motion.travelled(along, places.stations, own, own_trends, float(reaches[owners].max()))
         is_bicycle = tracked.classes[owners] == _BICYCLE
         keeps_side = is_bicycle & (np.abs(places.offsets) <= places.half_widths)
-        boxes = tracked.boxes.take(owners, axis=0)
         poses = self._paths.bodies(along, stations, boxes[:, 3])
         x, y, headings = poses
         cosines, sines = np.cos(headings), np.sin(headings)
@@ -145,6 +149,12 @@ class MapPrediction:
         ends = zip(paths, stations[:, 0].tolist(), stations[:, -1].tolist(), strict=True)
         lanes = [path.lanes_between(start, end) for path, start, end in ends]
         return _told_apart(Hypotheses(owners, probabilities, poses.transpose(1, 2, 0), lanes))
+
+    def _nose_speeds(self, velocities: Floats, headings: Floats, steering: Floats) -> Floats:
+        """Speeds (h,) of noses that follow their paths; a body is slower than its nose, which only pulls it along."""
+        along = velocities[:, 0] * np.cos(headings) + velocities[:, 1] * np.sin(headings)
+        speeds: Floats = np.maximum(along / np.maximum(np.cos(steering), _LEAST_COSINE), self._config.standing_speed)
+        return speeds
 
     def _straight_on(self, tracked: TrackedObjects, rows: Integers, speeds: Floats) -> Hypotheses:
         """Constant velocity, which is none for a standing vehicle or obstacle."""
