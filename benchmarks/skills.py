@@ -44,9 +44,11 @@ def cars(route: str, period: int, stops: dict[int, str] | None = None) -> str:
     )
 
 
-def cross(junction: str, period: float) -> Skill:
-    """Four arms, from each to each other one; those to the east and west are the major road."""
-    arms = {"n": (0.0, 300.0), "e": (300.0, 0.0), "s": (0.0, -300.0), "w": (-300.0, 0.0)}
+ARMS = {"n": (0.0, 300.0), "e": (300.0, 0.0), "s": (0.0, -300.0), "w": (-300.0, 0.0)}
+
+
+def cross(junction: str, period: float, arms: dict[str, tuple[float, float]] = ARMS) -> Skill:
+    """From each of the arms to each other one; those to the east and west are the major road."""
     roads = [(arm, f'speed="13.9" priority="{2 if arm in "ew" else 1}"') for arm in arms]
     edges = {name: road for arm, road in roads for name in (f"{arm}c", f"c{arm}")}
     demand = "".join(flow(f"{begin}c", f"c{end}", period) for begin in arms for end in arms if begin != end)
@@ -123,6 +125,16 @@ SKILLS = {
         ),
         additional='<parkingArea id="park" lane="ab_0" startPos="100" endPos="140" roadsideCapacity="6"/>',
     ),
+    "u_turns": Skill(
+        {"a": (0.0, 0.0), "c": (400.0, 0.0), "d": (800.0, 0.0)},
+        {
+            **{name: f'{TWO} shape="{west},-4 {east},-4"' for name, west, east in (("ac", 0, 390), ("cd", 410, 800))},
+            **{name: f'{TWO} shape="{east},4 {west},4"' for name, west, east in (("ca", 0, 390), ("dc", 410, 800))},
+        },
+        flow("ac", "ca", 15.0) + flow("ac", "cd", 8.0) + flow("dc", "ca", 8.0),
+        joined="ac_0>cd_0 ac_1>cd_1 ac_1>ca_0 dc_0>ca_0 dc_1>ca_1",
+    ),
+    "sharp_turns": cross("priority", 40.0, {"n": (-212.0, 212.0), "e": (300.0, 0.0), "w": (-300.0, 0.0)}),
     "sudden_stops": Skill(
         straight(0.0, 1200.0),
         {"ab": 'speed="22.2"'},
