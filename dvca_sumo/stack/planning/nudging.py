@@ -160,6 +160,8 @@ class NudgeDecider:
         offset, wanted = last.offset, 0.0 if plateau is None else plateau.offset
         if blocker.walks or wanted * offset < 0.0 or self._meets_another(blocker, offset):
             return None
+        if blocker.clearance(offset) < 0.0:  # it is in the way there, too: it is stopped for
+            return None
         window, speed = situation.window, situation.speed
         back = way_back(Lateral(offset, 0.0, 0.0), last.end, speed, window, self._shape, self._config)
         out = blend_length(wanted, speed, self._config)

@@ -383,6 +383,18 @@ def test_who_is_stopped_for_costs_nobody_before_them_the_room_they_want() -> Non
     assert driven.states[beside, 2].min() > 0.3
 
 
+@pytest.mark.parametrize("gap", [8.0, 12.0])
+@pytest.mark.parametrize("beside", [-1.35, -1.5])
+def test_who_stands_across_the_lane_is_not_passed_as_far_aside_as_a_person_before_them_nor_costs_that_one_room(
+    beside: float, gap: float
+) -> None:
+    driven = drive(road(), 20.0, speed=8.0, station=60.0, actors=[person(3, 100.0, beside), car(4, 102.5 + gap)])
+    by_person = (driven.fronts > 99.0) & (driven.states[:, 1] < 101.0)
+    assert driven.clearances[by_person].min() > 0.6
+    assert "nudge left 4" not in driven.decisions
+    assert driven.speeds[-1] == 0.0
+
+
 def test_gap_between_two_objects_that_is_too_narrow_is_stopped_for() -> None:
     driven = drive(road(lanes_left=1), 25.0, speed=12.0, actors=[cone(5, 110.0, -0.9), cone(6, 110.0, 2.05)])
     assert driven.speeds[-1] == 0.0
