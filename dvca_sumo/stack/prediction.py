@@ -140,8 +140,8 @@ class MapPrediction:
         poses = self._paths.bodies(along, stations, boxes[:, 3])
         x, y, headings = poses
         cosines, sines = np.cos(headings), np.sin(headings)
-        beside = (boxes[:, 1] - y[:, 0]) * cosines[:, 0] - (boxes[:, 0] - x[:, 0]) * sines[:, 0]
-        offsets, slants = self._motion.settled(beside, np.where(keeps_side, beside, 0.0), drifts, own)
+        targets = np.where(keeps_side, places.offsets, 0.0)
+        offsets, slants = self._motion.settled(places.offsets, targets, drifts, own)
         x -= offsets * sines
         y += offsets * cosines
         poses[2] = wrapped_all(headings + slants)
