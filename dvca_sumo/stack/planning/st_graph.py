@@ -254,7 +254,9 @@ def _leads(row: int, graph: Graph, lanes: frozenset[str], shape: VehicleShape, c
     """
     scene, futures, first = graph.scene, graph.scene.futures, graph.first[row]
     is_there = scene.times[first] <= PRESENT
-    is_in_lane = futures.directions[row, 0] > ALONG and graph.gaps[row, : first + 1].max() < config.object_margin
+    aslant = futures.half_widths[row, : first + 1] - 0.5 * scene.boxes[scene.owners[row], 4]  # wider than it is
+    is_along = futures.directions[row, 0] > ALONG
+    is_in_lane = is_along and (graph.gaps[row, : first + 1] + aslant).max() < config.object_margin
     is_beside = graph.low[row, 0] < shape.front and (scene.is_person[row] or futures.directions[row, 0] < -ALONG)
     if is_beside or abs(futures.directions[row, first]) < ALONG or not (is_there or is_in_lane):
         return False

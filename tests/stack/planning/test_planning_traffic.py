@@ -943,3 +943,14 @@ def test_who_stands_right_behind_the_ego_in_a_tight_turn_does_not_hold_it(statio
     driven = drive(route, 8.0, station=station, actors=[follower])
     assert 0.3 < driven.clearances[0] < 1.0
     assert driven.speeds[-1] > 3.0
+
+
+@pytest.mark.parametrize("heading", [0.8, 0.9, 1.0, 1.2])
+def test_a_long_vehicle_that_comes_aslant_into_the_side_of_an_ego_at_rest_is_not_behind_it_in_its_lane(
+    heading: float,
+) -> None:
+    nose_x, nose_y, half = 60.6, -2.6, 6.0
+    x, y = nose_x - half * math.cos(heading), nose_y - half * math.sin(heading)
+    bus = car(3, x, y, heading=heading, speed=3.5, size=(2.0 * half, 2.5), lanes=("aside_0",))
+    driven = drive(road(), 0.6, station=60.0, actors=[bus])
+    assert driven.speeds.max() < 0.05
