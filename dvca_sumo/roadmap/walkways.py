@@ -1,5 +1,6 @@
 """Ground for people on foot: pavements, the walking areas of junctions, and the crossings between them."""
 
+from collections import defaultdict
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ from dvca_sumo.roadmap.lanes import Lane
 from dvca_sumo.roadmap.reading import NetContents
 
 _KERB = 0.25  # [m] beyond its edge one is still on a ground
-_TOUCHING = 0.5  # [m] between grounds that are next to each other, and from them to their crossings, at most
+_TOUCHING = 0.5  # [m] between grounds that are next to each other, at most
 
 
 class Way(NamedTuple):
@@ -29,7 +30,7 @@ class Ground(NamedTuple):
 
     lane: str
     edges: shapely.Geometry  # of it and of the grounds next to it, together
-    ways: tuple[Way, ...]  # the crossings that begin here
+    ways: tuple[Way, ...]  # the crossings that begin here: at walking areas only
 
 
 class Walkways:
@@ -39,15 +40,17 @@ class Walkways:
         crossings = [lane for lane in net.lanes.values() if lane.is_crossing]
         shapes = {lane.id: _strip(lane) for lane in crossings}
         shapes |= {lane.id: _strip(lane) for lane in net.lanes.values() if lane.is_pavement}
+        self._ways: dict[str, list[Way]] = defaultdict(list)
         for junction in net.junctions.values():
             names = [name for movement in junction.movements for name in movement.internal]
             strips = [(net.lanes[name].line.points, net.lanes[name].width) for name in names]
-            shapes |= dict(zip(junction.walking, grounds(junction.walking.values(), strips), strict=True))
+            areas = dict(zip(junction.walking, grounds(junction.walking.values(), strips), strict=True))
+            shapes |= areas
+            for way in (way for name in junction.crossings for way in _ways(net.lanes[name])):
+                self._ways[_nearest(areas, way.entry)].append(way)
         self._lanes = list(shapes)
         self._tree = shapely.STRtree(list(shapes.values()))
         self._crossings = len(crossings)  # come first
-        self._ways = [way for lane in crossings for way in _ways(lane)]
-        self._entries = shapely.STRtree([shapely.Point(way.entry) for way in self._ways])
         self._known: dict[int, Ground] = {}
 
     def under(self, points: Floats) -> list[Ground | str | None]:
@@ -66,10 +69,8 @@ class Walkways:
             grounds = self._tree.geometries[near[near >= self._crossings]]
             grown = shapely.union_all(shapely.buffer(grounds, 0.5 * _TOUCHING, join_style="mitre"))
             together = shapely.buffer(grown, -0.5 * _TOUCHING, join_style="mitre")
-            ways = np.sort(self._entries.query(shape, predicate="dwithin", distance=_TOUCHING)).tolist()
-            self._known[number] = Ground(
-                self._lanes[number], shapely.boundary(together), tuple(self._ways[way] for way in ways)
-            )
+            lane = self._lanes[number]
+            self._known[number] = Ground(lane, shapely.boundary(together), tuple(self._ways.get(lane, ())))
         return self._known[number]
 
 
@@ -82,6 +83,12 @@ def room(points: Floats, directions: Floats, lengths: Floats, grounds: Sequence[
     hits = shapely.intersection(rays, [ground.edges for ground in grounds])
     found: Floats = np.where(shapely.is_empty(hits), lengths, shapely.distance(shapely.points(points), hits))
     return found
+
+
+def _nearest(areas: dict[str, shapely.Geometry], entry: tuple[float, float]) -> str:
+    """Which walking area of a junction a crossing there comes to, whose drawn end may lie metres off it; "" of none."""
+    point = shapely.Point(entry)
+    return min(areas, key=lambda name: float(shapely.distance(point, areas[name])), default="")
 
 
 def _strip(lane: Lane) -> shapely.Geometry:

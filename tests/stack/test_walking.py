@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 import sumolib
 
 from dvca_sumo.messages import PREDICTION_TIMES, Floats, ObjectClass, PredictedObjects, TrackedObjects
 from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.roadmap.walkways import Ground
 from dvca_sumo.stack.prediction import MapPrediction, PredictionConfig
 
 NODES = """<nodes>
-    <node id="w" x="-100" y="0"/><node id="e" x="100" y="0"/><node id="s" x="0" y="-100"/><node id="n" x="0" y="100"/>
+    <node id="w" x="-100" y="0"/><node id="e" x="100" y="0"/><node id="s" x="{}" y="-100"/><node id="n" x="{}" y="100"/>
     <node id="x" x="0" y="0" type="priority"/>
 </nodes>"""
 EDGES = "<edges>{}</edges>".format(
@@ -24,15 +26,19 @@ EDGES = "<edges>{}</edges>".format(
 SPEED = 1.4  # [m/s]
 
 
-@pytest.fixture(scope="module")
-def roadmap(tmp_path_factory: pytest.TempPathFactory) -> RoadMap:
-    folder: Path = tmp_path_factory.mktemp("streets")
-    (folder / "nodes.xml").write_text(NODES)
+def streets(folder: Path, south: float, north: float) -> Path:
+    """The net; the southern and the northern arm end so far east [m]."""
+    (folder / "nodes.xml").write_text(NODES.format(south, north))
     (folder / "edges.xml").write_text(EDGES)
     command = [sumolib.checkBinary("netconvert"), "-n", "nodes.xml", "-e", "edges.xml", "-o", "net.xml"]
     command += ["--sidewalks.guess", "--crossings.guess", "--offset.disable-normalization"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)  # noqa: S603 - SUMO's own program
-    return RoadMap.load(folder / "net.xml")
+    return folder / "net.xml"
+
+
+@pytest.fixture(scope="module")
+def roadmap(tmp_path_factory: pytest.TempPathFactory) -> RoadMap:
+    return RoadMap.load(streets(tmp_path_factory.mktemp("streets"), 0.0, 0.0))
 
 
 def walking(roadmap: RoadMap, place: Floats, heading: float, speed: float = SPEED) -> PredictedObjects:
@@ -121,6 +127,25 @@ def test_on_the_way_to_a_crossing_they_may_use_it_or_not(roadmap: RoadMap) -> No
     assert walked == pytest.approx(SPEED * 6.0, abs=0.1)
     (other,) = (row for row in range(len(found.owners)) if len(found.lanes[row]) == 1)
     assert (found.poses[other, -1, :2] - begin) @ across < 0.1
+
+
+@pytest.mark.parametrize(("south", "north"), [(0.0, 0.0), (60.0, 0.0), (-80.0, 120.0), (150.0, 150.0)])
+def test_the_crossings_that_begin_at_a_walking_area_are_those_that_the_net_connects_to_it(
+    tmp_path: Path, south: float, north: float
+) -> None:
+    """However far off the area SUMO draws the ends of their middle lines, where streets meet aslant."""
+    path = streets(tmp_path, south, north)
+    walkways = RoadMap.load(path).walkways
+    net = sumolib.net.readNet(str(path), withInternal=True)
+    areas = [edge for edge in net.getEdges() if edge.getID().startswith(":x_w")]
+    assert len(areas) == 4
+    for area in areas:
+        crossings = {edge.getID() for edge in (*area.getIncoming(), *area.getOutgoing())}
+        outline = shapely.make_valid(shapely.Polygon([point[:2] for point in area.getLane(0).getShape()]))
+        (ground,) = walkways.under(shapely.get_coordinates(outline.representative_point()))
+        assert isinstance(ground, Ground)
+        assert ground.lane == area.getLane(0).getID()
+        assert {f"{edge}_0" for edge in crossings if "_c" in edge} == {way.lane for way in ground.ways}
 
 
 def test_away_from_a_crossing_they_do_not_use_it(roadmap: RoadMap) -> None:
