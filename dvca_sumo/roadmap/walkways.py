@@ -46,8 +46,9 @@ class Walkways:
             strips = [(net.lanes[name].line.points, net.lanes[name].width) for name in names]
             areas = dict(zip(junction.walking, grounds(junction.walking.values(), strips), strict=True))
             shapes |= areas
-            for way in (way for name in junction.crossings for way in _ways(net.lanes[name])):
-                self._ways[_nearest(areas, way.entry)].append(way)
+            for name in junction.crossings:
+                for way in _ways(net.lanes[name]):
+                    self._ways[_nearest(areas, way.entry)].append(way)
         self._lanes = list(shapes)
         self._tree = shapely.STRtree(list(shapes.values()))
         self._crossings = len(crossings)  # come first
