@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from dvca_sumo.messages import Floats, TrackedObjects, VehicleShape
+from dvca_sumo.messages import Flags, Floats, TrackedObjects, VehicleShape
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.lane_gaps import LAST_SPEED, Gaps, Neighbours
@@ -21,6 +21,7 @@ from dvca_sumo.stack.planning.speed import Stop
 ARRIVED = 0.4  # [m] from the lane's centre
 _OVER = 0.2  # [m] of the body over the marking, from which on going on is safer than going back
 _OVERLAP = 1.0  # [m] lengthwise, of who is abreast
+_LEAST_GAP = 1.0  # [m] kept by who brakes for somebody, and at least divided by
 _WAITING = "wait to change lanes"
 _NEAR_END = 3.0  # [m] before the place where it has to
 
@@ -91,7 +92,10 @@ class LaneChanger:
                 break
             target += 1
         width, beside = change.widths[self._lane], occupied[self._lane + 1]
-        if target < self._target and goes_on(aside, width, beside, self._shape):
+        if target < self._target and (
+            goes_on(aside, width, beside, self._shape)
+            or is_caught(occupied[self._lane], beside, speed, self._shape, self._config)
+        ):
             target = self._target
         self._target = target
         behind = letting_in(occupied[self._lane + 1 : target + 1], self._shape)
@@ -158,6 +162,23 @@ def goes_on(aside: float, width: float, lane: Neighbours, shape: VehicleShape) -
     over = abs(aside) - 0.5 * (width - shape.width)
     is_abreast = (lane.rears < shape.front - _OVERLAP) & (lane.fronts > _OVERLAP - shape.rear_overhang)
     return over > 0.5 * shape.width or (over > _OVER and not is_abreast.any())
+
+
+def is_caught(own: Neighbours, lane: Neighbours, speed: float, shape: VehicleShape, config: PlanningConfig) -> bool:
+    """Whether an ego at `speed` [m/s] on its way to `lane` cannot stay behind who is ahead on its `own` any more.
+
+    To do so it would brake harder than in comfort, and harder than anybody behind on `lane` would have to for it.
+    """
+    is_behind = lane.fronts < shape.front
+    needed = _braking(speed - own.speeds, own.rears - shape.front, own.rears > shape.front)
+    asked = _braking(lane.speeds - speed, -shape.rear_overhang - lane.fronts, is_behind)
+    return needed > max(config.comfort_braking, asked)
+
+
+def _braking(closing: Floats, gaps: Floats, which: Flags) -> float:
+    """The braking that takes off speeds `closing` (m,) [m/s] within `gaps` (m,) [m], the most of those `which` (m,)."""
+    closing, gaps = np.maximum(closing[which], 0.0), np.maximum(gaps[which] - _LEAST_GAP, _LEAST_GAP)
+    return float((closing * closing / (2.0 * gaps)).max(initial=0.0))
 
 
 def is_last_chance(stop: Stop, speed: float) -> bool:

@@ -17,6 +17,7 @@ from dvca_sumo.stack.planning.lane_changing import (
     LaneChoice,
     goes_on,
     is_at_junction,
+    is_caught,
     is_last_chance,
     keeping,
     last_stop,
@@ -82,6 +83,7 @@ class Passing:
             is_under_way = self._lane != self._target
             is_pressed = is_under_way or (stop is not None and is_last_chance(stop, speed))
             is_begun = goes_on(float(aside[self._lane]), way.widths[self._lane], occupied[target], shape)
+            is_begun |= is_under_way and is_caught(occupied[self._lane], occupied[target], speed, shape, config)
             is_pulling_out = target == _BESIDE != self._target
             may_begin = is_begun or (
                 (is_under_way or not is_at_junction(way, window, speed, shape, config))

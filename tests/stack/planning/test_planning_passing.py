@@ -180,3 +180,16 @@ def test_a_move_to_the_next_lane_ends_where_it_was_to_end_when_it_began() -> Non
     assert driven.states[:, 2].max() < WIDTH + 0.05
     assert driven.speeds[-1] > 7.0
     assert_drivable(driven)
+
+
+@pytest.mark.parametrize(
+    ("speed", "gap", "behind", "slow"), [(13.0, 26.0, 40.0, 1.0), (13.0, 32.0, 30.0, 0.3), (13.0, 40.0, 30.0, 1.0)]
+)
+def test_a_change_begun_is_gone_on_with_where_falling_back_would_ask_more_of_the_ego_than_of_who_comes(
+    speed: float, gap: float, behind: float, slow: float
+) -> None:
+    """Who comes up on the next lane brakes for the ego, as it would have to."""
+    line = [car(10 + row, 5.0 + SHAPE.front + gap + 2.25 + 8.0 * row, speed=slow) for row in range(4)]
+    other = car(3, 5.0 - behind, WIDTH, speed=24.0, braking=2.5)
+    driven = drive(beside(), 8.0, speed=speed, actors=[*line, other])
+    assert driven.clearances.min() > 0.5
