@@ -160,19 +160,28 @@ def goes_on(aside: float, width: float, lane: Neighbours, shape: VehicleShape) -
     It does once it is over the marking, unless somebody has come abreast of it there, and once half of it is over.
     """
     over = abs(aside) - 0.5 * (width - shape.width)
-    is_abreast = (lane.rears < shape.front - _OVERLAP) & (lane.fronts > _OVERLAP - shape.rear_overhang)
-    return over > 0.5 * shape.width or (over > _OVER and not is_abreast.any())
+    return over > 0.5 * shape.width or (over > _OVER and not _is_abreast(lane, shape))
 
 
 def is_caught(own: Neighbours, lane: Neighbours, speed: float, shape: VehicleShape, config: PlanningConfig) -> bool:
     """Whether an ego at `speed` [m/s] on its way to `lane` cannot stay behind who is ahead on its `own` any more.
 
-    To do so it would brake harder than in comfort, and harder than anybody behind on `lane` would have to for it.
+    To do so it would brake harder than in comfort, and harder than going on asks for: of it, behind who is ahead on
+    `lane`, and of who is behind there. Where somebody is abreast of it there, it does not go on.
     """
-    is_behind = lane.fronts < shape.front
-    needed = _braking(speed - own.speeds, own.rears - shape.front, own.rears > shape.front)
-    asked = _braking(lane.speeds - speed, -shape.rear_overhang - lane.fronts, is_behind)
-    return needed > max(config.comfort_braking, asked)
+    if _is_abreast(lane, shape):
+        return False
+    closing, gaps, is_ahead = speed - lane.speeds, lane.rears - shape.front, lane.fronts > shape.front
+    staying = _braking(speed - own.speeds, own.rears - shape.front, own.rears > shape.front)
+    going = _braking(closing, gaps, is_ahead)
+    asked = _braking(-closing, -shape.rear_overhang - lane.fronts, ~is_ahead)
+    return staying > max(config.comfort_braking, going, asked)
+
+
+def _is_abreast(lane: Neighbours, shape: VehicleShape) -> bool:
+    """Whether somebody on the lane is beside the ego."""
+    beside = (lane.rears < shape.front - _OVERLAP) & (lane.fronts > _OVERLAP - shape.rear_overhang)
+    return bool(beside.any())
 
 
 def _braking(closing: Floats, gaps: Floats, which: Flags) -> float:

@@ -9,7 +9,8 @@ from dvca_sumo.messages import PREDICTION_TIMES
 from dvca_sumo.roadmap import Route
 from dvca_sumo.roadmap.route import PassingLane
 from dvca_sumo.stack.planning import PlanningConfig
-from dvca_sumo.stack.planning.lane_gaps import Gaps
+from dvca_sumo.stack.planning.lane_changing import is_caught
+from dvca_sumo.stack.planning.lane_gaps import Gaps, Neighbours
 from dvca_sumo.stack.planning.passing import Passing
 from dvca_sumo.stack.planning.reference import Reference
 
@@ -193,3 +194,27 @@ def test_a_change_begun_is_gone_on_with_where_falling_back_would_ask_more_of_the
     other = car(3, 5.0 - behind, WIDTH, speed=24.0, braking=2.5)
     driven = drive(beside(), 8.0, speed=speed, actors=[*line, other])
     assert driven.clearances.min() > 0.5
+
+
+@pytest.mark.parametrize(
+    ("rear", "speed", "expected"),
+    [
+        (-30.0, 14.0, True),
+        (-30.0, 30.0, False),  # it would have to brake harder than the ego
+        (-4.0, 12.0, False),
+        (0.0, 12.0, False),
+        (2.0, 12.0, False),
+        (15.0, 2.0, False),  # to stay behind it asks for more than staying in the lane
+        (15.0, 12.0, True),
+    ],
+)
+def test_before_who_stands_a_change_is_gone_on_with_but_not_into_who_is_beside_or_asks_for_more(
+    rear: float,
+    speed: float,
+    expected: bool,  # noqa: FBT001
+) -> None:
+    def neighbours(place: float, pace: float) -> Neighbours:
+        return Neighbours(np.array([place]), np.array([place + 4.5]), np.array([pace]), np.array([True]), [1])
+
+    standing, other = neighbours(SHAPE.front + 20.0, 0.0), neighbours(rear, speed)
+    assert is_caught(standing, other, 13.0, SHAPE, PlanningConfig()) == expected
