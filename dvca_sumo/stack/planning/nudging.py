@@ -12,6 +12,7 @@ from dvca_sumo.stack.planning.keeping import kept
 from dvca_sumo.stack.planning.moves import Lateral, Move, blend_length, feasible_length, roomy_length
 from dvca_sumo.stack.planning.path import Plateau, way_back
 from dvca_sumo.stack.planning.room import room_beside
+from dvca_sumo.stack.planning.scene import IN_LANE
 from dvca_sumo.stack.planning.sides import Sides
 from dvca_sumo.stack.planning.situation import Situation
 from dvca_sumo.stack.planning.staying import Staying
@@ -73,7 +74,8 @@ class NudgeDecider:
                 passed.append((blocker, plateau))
                 last = plateau
         self._followers = followers
-        nudges = [Nudge(blocker.track, plateau) for blocker, plateau in self._reconciled(passed, beside)]
+        settled = self._reconciled(passed, beside) + self._gone_by(found, passed, situation)
+        nudges = [Nudge(blocker.track, plateau) for blocker, plateau in settled]
         self._held = {
             nudge.track: Plateau(station + begin, station + end, offset)
             for nudge in nudges
@@ -203,6 +205,23 @@ class NudgeDecider:
             if offset:
                 found.append((blocker, plateau._replace(offset=offset)))
         return found
+
+    def _gone_by(
+        self, found: Sequence[Blocker], passed: Sequence[tuple[Blocker, Plateau]], situation: Situation
+    ) -> list[tuple[Blocker, Plateau]]:
+        """Those in the way on the line whom the ego, half-way to it, is beside: it stays where it is until past them.
+
+        They may wait in traffic, and are not passed otherwise.
+        """
+        offset, decided = situation.lateral.offset, {blocker.track for blocker, _ in passed}
+        return [
+            (blocker, self._passed_at(blocker, offset)._replace(begin=0.0))
+            for blocker in found
+            if blocker.low < self._shape.front
+            and abs(situation.scene.now.offsets[blocker.row]) < IN_LANE
+            and blocker.clearance(0.0) < 0.0 <= blocker.clearance(offset)
+            and not (blocker.walks or blocker.track in decided)
+        ]
 
     def _passed_at(self, blocker: Blocker, offset: float) -> Plateau:
         """Where to be at an offset to pass an object that stands."""

@@ -700,3 +700,13 @@ def test_nobody_beside_a_bend_is_taken_to_stand_clear_who_does_not(radius: float
     near = np.maximum(right, -left) < config.nudge_clearance
     assert 5 < np.count_nonzero(near) < 195
     assert {blocker.track for blocker in found} == set(near.nonzero()[0].tolist())
+
+
+@pytest.mark.parametrize(("speed", "x"), [(0.0, 60.1), (0.0, 61.0), (3.0, 60.1), (3.0, 63.0), (8.0, 63.0)])
+def test_half_way_to_its_lane_beside_who_waits_there_the_ego_goes_by_before_it_moves_over(
+    speed: float, x: float
+) -> None:
+    driven = drive(road(lanes_left=1), 8.0, station=60.0, speed=speed, aside=2.2, actors=[car(4, x, 0.08)])
+    assert driven.clearances.min() > driven.clearances[0] - 0.01
+    assert driven.speeds[-1] > 10.0
+    assert abs(driven.states[-1, 2]) < 0.1
