@@ -5,8 +5,9 @@ moves farther in one step than its speed allows (a jump; SUMO's lane changes are
 spot), and what is violated with it is so before anybody reacts; or at that moment it touches the ego, or is so close in
 the ego's way that full braking after a reaction would not keep the ego off it; a person who appears need only be within
 a step of the ego. Or a person walks into an ego that has stood for a second, or, after standing beside one, its front
-past, at its flank, and is within a step of it: SUMO's people walk through vehicles. Then, for a while after, violations
-with that body are the simulator's doing.
+past, at its flank, and is within a step of it: SUMO's people walk through vehicles. So it is with who jumps there, for
+as long as it takes the ego to react, to brake as hard as it can, and to have stood for that second. Then, for a while
+after, violations with that body are the simulator's doing.
 """
 
 import math
@@ -58,7 +59,7 @@ class Disturbances:
         self._rows: dict[str, int] = {}  # by name, in the moment before
         self._sudden: dict[str, list[Disturbance]] = {}  # by name, when it appeared or jumped, however far away
         self._drove = -math.inf  # [s] when the ego last moved
-        self._waited: dict[str, float] = {}  # [s] by person, when they last stood beside the ego
+        self._excused: dict[str, float] = {}  # [s] by person: until when walking at the flank is the simulator's doing
 
     def see(self, moment: Moment) -> None:
         """Take in the next moment. To an ego that has just departed, every body has just appeared."""
@@ -82,7 +83,7 @@ class Disturbances:
                 self.found.append(Disturbance(moment.time, names[row], how))
         if abs(moment.ego.speed) >= _STANDING:
             self._drove = moment.time
-        self._see_people(moment)
+        self._see_people(moment, jumped)
         self._before, self._rows = objects, rows
 
     def explain(self, name: str | None, time: float) -> Disturbance | None:
@@ -118,8 +119,8 @@ class Disturbances:
         in_way = found.rows[found.gaps < _way_to_stop(ego.speed, found.speeds)]
         return sorted({*touching, *beside, *in_way.tolist()})
 
-    def _see_people(self, moment: Moment) -> None:
-        """Who walks into the ego while it stands, or, having stood beside it with its front past, at its flank."""
+    def _see_people(self, moment: Moment, jumped: list[int]) -> None:
+        """Who walks into the ego while it stands, or, having stood or `jumped` beside its flank, at that."""
         ego, objects, rows = moment.ego, moment.objects, self._places.within(moment, BESIDE)
         rows = rows[objects.classes[rows] == _PERSON]
         if not rows.size:
@@ -134,10 +135,11 @@ class Disturbances:
         for row in rows[gaps <= 0.0].tolist() if moment.time - self._drove >= STOOD else ():
             self.found.append(Disturbance(moment.time, objects.ids[row], "walked into the standing ego"))
         for name in (objects.ids[row] for row in rows[(gaps < STEP) & is_beside & towards].tolist()):
-            if moment.time - self._waited.get(name, -math.inf) <= LASTING:
+            if moment.time <= self._excused.get(name, -math.inf):
                 self.found.append(Disturbance(moment.time, name, "walked at the ego's flank"))
-        stands = is_beside & (speeds < _STANDING)
-        self._waited.update((objects.ids[row], moment.time) for row in rows[stands].tolist())
+        leapt, stands = is_beside & np.isin(rows, jumped), is_beside & (speeds < _STANDING)
+        for which, lasting in ((leapt, REACTION + abs(ego.speed) / BRAKING + STOOD), (stands, LASTING)):
+            self._excused.update((objects.ids[row], moment.time + lasting) for row in rows[which].tolist())
 
 
 def _way_to_stop(speed: float, others: Floats) -> Floats:

@@ -284,6 +284,31 @@ def test_who_stood_beside_the_ego_and_walks_into_its_flank_is_the_simulators_doi
     assert at_contact(moments[: touching + 1], roads) == [("collision", fault)]
 
 
+@pytest.mark.parametrize(
+    ("jump", "pace", "front", "fault"),
+    [
+        (2.0, 1.5, 202.0, Fault.SIMULATOR),
+        (0.0, 1.5, 202.0, Fault.DRIVER),
+        (2.0, 0.4, 202.0, Fault.DRIVER),
+        (2.0, 1.5, 199.4, Fault.DRIVER),
+    ],
+)
+def test_who_jumps_beside_the_ego_and_walks_into_its_flank_is_the_simulators_doing(
+    roads: RoadMap, jump: float, pace: float, front: float, fault: Fault
+) -> None:
+    """On a junction. Who takes longer than to a stop, and a second, or jumps there before the front is past, is not."""
+
+    def walked(k: int) -> Moment:
+        y = LANE_Y - 2.6 + 0.1 * pace * k - jump * (k < 0)
+        one = on_foot(moment(0.1 * k, front + 0.05 * k, 0.5, [("p", (200.0, y), 0.0)]))
+        velocities = np.array([[0.0, pace]])
+        return msgspec.structs.replace(one, objects=msgspec.structs.replace(one.objects, velocities=velocities))
+
+    moments = [walked(k) for k in range(-10, 40)]
+    touching = next(k for k, one in enumerate(moments) if one.objects.boxes[0, 1] + 0.25 >= LANE_Y - 0.9)
+    assert at_contact(moments[: touching + 1], roads) == [("collision", fault)]
+
+
 @pytest.mark.parametrize(("waits", "fault"), [(True, Fault.SIMULATOR), (False, Fault.DRIVER)])
 def test_who_walks_close_up_to_the_egos_flank_is_judged_as_who_walks_into_it(
     roads: RoadMap, *, waits: bool, fault: Fault
