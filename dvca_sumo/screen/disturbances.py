@@ -139,7 +139,8 @@ class Disturbances:
                 self.found.append(Disturbance(moment.time, name, "walked at the ego's flank"))
         leapt, stands = is_beside & np.isin(rows, jumped), is_beside & (speeds < _STANDING)
         for which, lasting in ((leapt, REACTION + abs(ego.speed) / BRAKING + STOOD), (stands, LASTING)):
-            self._excused.update((objects.ids[row], moment.time + lasting) for row in rows[which].tolist())
+            for name in (objects.ids[row] for row in rows[which].tolist()):
+                self._excused[name] = max(moment.time + lasting, self._excused.get(name, -math.inf))
 
 
 def _way_to_stop(speed: float, others: Floats) -> Floats:

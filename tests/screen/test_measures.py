@@ -285,23 +285,27 @@ def test_who_stood_beside_the_ego_and_walks_into_its_flank_is_the_simulators_doi
 
 
 @pytest.mark.parametrize(
-    ("jump", "pace", "front", "fault"),
+    ("jump", "stands", "pace", "front", "fault"),
     [
-        (2.0, 1.5, 202.0, Fault.SIMULATOR),
-        (0.0, 1.5, 202.0, Fault.DRIVER),
-        (2.0, 0.4, 202.0, Fault.DRIVER),
-        (2.0, 1.5, 199.4, Fault.DRIVER),
+        (2.0, False, 1.5, 202.0, Fault.SIMULATOR),
+        (0.0, False, 1.5, 202.0, Fault.DRIVER),
+        (2.0, False, 0.4, 202.0, Fault.DRIVER),
+        (0.9, True, 0.4, 202.0, Fault.SIMULATOR),
+        (2.0, False, 1.5, 199.4, Fault.DRIVER),
     ],
 )
 def test_who_jumps_beside_the_ego_and_walks_into_its_flank_is_the_simulators_doing(
-    roads: RoadMap, jump: float, pace: float, front: float, fault: Fault
+    roads: RoadMap, *, jump: float, stands: bool, pace: float, front: float, fault: Fault
 ) -> None:
-    """On a junction. Who takes longer than to a stop, and a second, or jumps there before the front is past, is not."""
+    """On a junction. Who takes longer than to a stop, and a second, or jumps there before the front is past, is not.
+
+    Who stood there before, and has longer, still has.
+    """
 
     def walked(k: int) -> Moment:
-        y = LANE_Y - 2.6 + 0.1 * pace * k - jump * (k < 0)
+        y = LANE_Y - 2.6 + 0.1 * pace * (max(k, 0) if stands else k) - jump * (k < 0)
         one = on_foot(moment(0.1 * k, front + 0.05 * k, 0.5, [("p", (200.0, y), 0.0)]))
-        velocities = np.array([[0.0, pace]])
+        velocities = np.array([[0.0, pace * (k >= 0 or not stands)]])
         return msgspec.structs.replace(one, objects=msgspec.structs.replace(one.objects, velocities=velocities))
 
     moments = [walked(k) for k in range(-10, 40)]
