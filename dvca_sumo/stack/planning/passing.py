@@ -82,8 +82,10 @@ class Passing:
         if target != self._lane:
             is_under_way = self._lane != self._target
             is_pressed = is_under_way or (stop is not None and is_last_chance(stop, speed))
-            is_begun = goes_on(float(aside[self._lane]), way.widths[self._lane], occupied[target], shape)
-            is_begun |= is_under_way and is_caught(occupied[self._lane], occupied[target], speed, shape, config)
+            is_begun = is_under_way and (
+                goes_on(float(aside[self._lane]), way.widths[self._lane], occupied[target], shape)
+                or is_caught(occupied[self._lane], occupied[target], speed, shape, config)
+            )
             is_pulling_out = target == _BESIDE != self._target
             may_begin = is_begun or (
                 (is_under_way or not is_at_junction(way, window, speed, shape, config))

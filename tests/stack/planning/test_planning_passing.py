@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from planned_drives import SHAPE, Actor, Drive, assert_drivable, car, cone, drive, predicted, road, straight_points
 
-from dvca_sumo.messages import PREDICTION_TIMES
+from dvca_sumo.messages import PREDICTION_TIMES, ObjectClass
 from dvca_sumo.roadmap import Route
 from dvca_sumo.roadmap.route import PassingLane
 from dvca_sumo.stack.planning import PlanningConfig
@@ -218,3 +218,27 @@ def test_before_who_stands_a_change_is_gone_on_with_but_not_into_who_is_beside_o
 
     standing, other = neighbours(SHAPE.front + 20.0, 0.0), neighbours(rear, speed)
     assert is_caught(standing, other, 13.0, SHAPE, PlanningConfig()) == expected
+
+
+@pytest.mark.parametrize(("faster", "braking", "gap", "aside"), [(1.0, 0.0, 2.0, 0.6), (5.0, 2.0, 6.0, 0.5)])
+def test_on_its_way_back_from_a_change_given_up_it_does_not_begin_that_again_without_a_gap(
+    faster: float, braking: float, gap: float, aside: float
+) -> None:
+    """Somebody from the lane beyond is on the ego's own lane at once, when the ego has begun to come back to it."""
+    slow = car(7, 80.0, speed=8.5)
+    alone = drive(beside(), 20.0, speed=13.0, actors=[slow])
+    times, offsets = alone.states[:, 0], alone.states[:, 2]
+    row = int(((times > 10.0) & (offsets < WIDTH - aside)).argmax())
+    since, rear = float(times[row]), float(alone.fronts[row]) - SHAPE.length
+
+    class Cutter(Actor, frozen=True):
+        def speed_at(self, time: float) -> float:
+            return float(alone.speeds[row]) + faster - braking * max(time - since, 0.0)
+
+        def box_at(self, time: float) -> list[float]:
+            way = 0.5 * (self.speed_at(since) + self.speed_at(time)) * (time - since)
+            nose = rear - gap + way
+            return [nose - 0.5 * self.size[0], -WIDTH if time < since else 0.0, 0.0, *self.size]
+
+    driven = drive(beside(), since + 6.0, speed=13.0, actors=[slow, Cutter(3, ObjectClass.VEHICLE, 0.0, 0.0)])
+    assert driven.clearances.min() > 0.4
