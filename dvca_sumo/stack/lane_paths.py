@@ -19,8 +19,8 @@ from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.continuations import Continuations, Traffic
 
-# Rows of the table; what is looked up together is adjacent.
-_X, _Y, _HEADING, _HALF_WIDTH, _BEND_SPEED, _LIMIT, _ROWS = range(7)
+# Rows of the table, steps being those to the next column [m]; what is looked up together is adjacent.
+_STEP_X, _STEP_Y, _X, _Y, _HEADING, _HALF_WIDTH, _BEND_SPEED, _LIMIT, _ROWS = range(9)
 
 _TAIL = 300  # [m] beyond a dead end or the net's edge, traffic is taken to go straight on
 _LENGTH_STEP = 40.0  # [m] continuations are kept by length in such steps
@@ -94,20 +94,21 @@ class LanePaths:
         It is their noses that are sought: in a bend, the middle of what follows a path is beside it.
         """
         first, last = paths
-        halves, bearings = 0.5 * boxes[:, 3], boxes[:, 2]
-        noses = boxes[:, :2] + halves[:, None] * np.stack((np.cos(bearings), np.sin(bearings)), axis=1)
+        centre_x, centre_y, bearings, lengths, _ = boxes.T
+        halves = 0.5 * lengths
+        nose_x, nose_y = centre_x + halves * np.cos(bearings), centre_y + halves * np.sin(bearings)
         searched = (np.rint(guesses + halves).astype(np.int64) + first)[:, None] + _WINDOW
         searched = np.minimum(np.maximum(searched, first[:, None]), last[:, None])
-        x, y = self._table[: _Y + 1].take(searched, axis=1)
-        x, y = noses[:, :1] - x, noses[:, 1:] - y
+        x, y = self._table[_X : _Y + 1].take(searched, axis=1)
+        x, y = nose_x[:, None] - x, nose_y[:, None] - y
         nearest = searched[np.arange(len(searched)), (x * x + y * y).argmin(axis=1)]
-        x, y, ahead, half_widths = self._table[: _HALF_WIDTH + 1].take(nearest, axis=1)
-        along = (noses[:, 0] - x) * np.cos(ahead) + (noses[:, 1] - y) * np.sin(ahead)
+        x, y, ahead, half_widths = self._table[_X : _HALF_WIDTH + 1].take(nearest, axis=1)
+        along = (nose_x - x) * np.cos(ahead) + (nose_y - y) * np.sin(ahead)
         # Columns are 1 m apart: unless the window missed it, the nearest is about half a metre away along the path.
         beyond = np.maximum(np.abs(along) - 1.0, 0.0)
         stations = (nearest - first) + along - halves
-        x, y, headings = self.bodies(paths, stations[:, None], boxes[:, 3])[:, :, 0]
-        offsets = (boxes[:, 1] - y) * np.cos(headings) - (boxes[:, 0] - x) * np.sin(headings)
+        x, y, headings = self.bodies(paths, stations[:, None], lengths)[:, :, 0]
+        offsets = (centre_y - y) * np.cos(headings) - (centre_x - x) * np.sin(headings)
         return Placements(stations, offsets, headings, wrapped_all(ahead - bearings), half_widths, beyond)
 
     def caps(self, paths: Stretches, stations: Floats, count: int) -> tuple[Floats, Floats]:
@@ -124,20 +125,23 @@ class LanePaths:
         """
         first, last = paths
         half = 0.5 * lengths[:, None]
-        ends = np.concatenate((stations + half, stations - half), axis=1)
+        ends = np.empty((2, *stations.shape))  # front, rear
+        np.add(stations, half, out=ends[0])
+        np.subtract(stations, half, out=ends[1])
         columns = np.minimum(np.maximum(ends.astype(np.int64), 0), (last - first - 1)[:, None])
-        shares = ends - columns
+        ends -= columns
         columns += first[:, None]
-        table = self._table[: _Y + 1]
-        before = table.take(columns, axis=1)
-        points: Floats = table.take(columns + 1, axis=1)
-        points -= before
-        points *= shares
-        points += before
-        fronts, rears = points[:, :, : stations.shape[1]], points[:, :, stations.shape[1] :]
-        ways = fronts - rears
+        found = self._table[: _Y + 1].take(columns, axis=1)
+        points, steps = found[_X:], found[:_X]
+        steps *= ends
+        points += steps
+        ways = points[:, 0] - points[:, 1]
         x, y = ways
-        return np.concatenate((fronts - half / np.hypot(x, y) * ways, np.arctan2(y, x)[None]))
+        poses = np.empty((3, *stations.shape))
+        np.arctan2(y, x, out=poses[2])
+        ways *= half / np.hypot(x, y)
+        np.subtract(points[:, 0], ways, out=poses[:2])
+        return poses
 
     def _path(self, lanes: tuple[str, ...]) -> LanePath:
         found = self._paths.get(lanes)
@@ -158,9 +162,10 @@ class LanePaths:
         poses = line.poses(stations)
         columns = np.stack(
             [
+                *np.diff(poses[:, :2], axis=0, append=poses[-1:, :2]).T,
                 *poses.T,
                 np.array([part.width / 2.0 for part in parts])[which],
-                self._bend_speeds(poses[:, _HEADING]),
+                self._bend_speeds(poses[:, 2]),
                 np.array([part.speed_limit for part in parts])[which],
             ]
         )
