@@ -168,8 +168,10 @@ def _beside(scene: Scene, window: Window, which: Flags) -> Beside:
 
 def _walks_along(scene: Scene) -> Flags:
     """Which people walk along the road, one way or the other."""
-    along: Flags = ~scene.is_standing & (scene.classes == _PERSON) & (np.abs(scene.now.directions) > PARALLEL)
-    return along
+    people: Flags = scene.classes == _PERSON
+    if np.count_nonzero(people):
+        people &= ~scene.is_standing & (np.abs(scene.now.directions) > PARALLEL)
+    return people
 
 
 def _met(stations: Floats, speeds: Floats, speed: float, acceleration: float) -> Floats:

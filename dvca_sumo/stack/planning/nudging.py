@@ -59,8 +59,11 @@ class NudgeDecider:
         scene, station = situation.scene, situation.window.station
         self._staying.see(situation)
         self._sides.see(situation)
-        passed: list[tuple[Blocker, Plateau]] = []
         found, beside = blockers(scene, situation.window, situation.speed, self._held, self._shape, self._config)
+        if not found:
+            self._held, self._followers = {}, set()
+            return [], []
+        passed: list[tuple[Blocker, Plateau]] = []
         last: Plateau | None = None
         followers = set()
         for blocker in found:
