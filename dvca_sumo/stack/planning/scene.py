@@ -75,11 +75,11 @@ def scene_in(
     is_person: Flags = objects.classes == _PERSON
     counts = predicted.probabilities >= config.possible
     slowest = _slowest_moving(ids, is_person.tolist(), stood, config)
-    standing = _foreseen_speeds(predicted, counts) < np.array(slowest)
+    standing = np.ones(len(ids), dtype=np.bool_)
+    stays = _foreseen_speeds(predicted) < np.array(slowest)[predicted.owners]
+    standing[predicted.owners[counts & ~stays]] = False
     counts &= ~standing[predicted.owners]
-    goes = np.zeros(len(standing), dtype=np.bool_)
-    goes[predicted.owners[counts]] = True
-    rows, still = counts.nonzero()[0], (~goes).nonzero()[0]
+    rows, still = counts.nonzero()[0], standing.nonzero()[0]
     poses = predicted.poses.take(rows, axis=0)
     if len(rows) > _FEW:
         around = _is_around(window, poses)
@@ -117,12 +117,10 @@ def _slowest_moving(
     return [(people if person else others)[track in stood] for track, person in zip(ids, is_person, strict=True)]
 
 
-def _foreseen_speeds(predicted: PredictedObjects, counts: Flags) -> Floats:
-    """Mean speed (n,) [m/s] over the next second in the fastest hypothesis that counts; 0 without any."""
+def _foreseen_speeds(predicted: PredictedObjects) -> Floats:
+    """Mean speed (h,) [m/s] over the next second in each hypothesis."""
     moved = predicted.poses[:, SOON, :2] - predicted.poses[:, 0, :2]
-    foreseen = np.hypot(moved[:, 0], moved[:, 1]) / SOON_TIME
-    speeds = np.zeros(len(predicted.objects.ids))
-    np.maximum.at(speeds, predicted.owners[counts], foreseen[counts])
+    speeds: Floats = np.hypot(moved[:, 0], moved[:, 1]) / SOON_TIME
     return speeds
 
 
