@@ -110,6 +110,8 @@ def _waiting(graph: Graph, views: list[LineView]) -> list[int]:
     """
     scene = graph.scene
     prior = frozenset().union(*(view.goes_first for view in views if view.line.control is not Control.SIGNAL))
+    if not prior:
+        return []
     rows = [row for row in range(scene.moving, len(scene.lanes)) if not prior.isdisjoint(scene.lanes[row])]
     if not rows:
         return []
@@ -171,16 +173,13 @@ def _hiding(graph: Graph, line: float) -> float:
 
 def _passing_speeds(graph: Graph, config: PlanningConfig) -> list[tuple[int, float, float]]:
     """Futures that are passed close by now, as rows, at which speed [m/s], and from how far before them on [m]."""
-    scene, nearest = graph.scene, max(config.person_slow_gap, config.object_slow_gap)
-    speeds = []
-    for row, gap in enumerate(graph.gaps[:, 0].tolist()):
-        if not 0.0 <= gap < nearest:
+    scene, speeds = graph.scene, []
+    for row, (gap, is_person) in enumerate(zip(graph.gaps[:, 0].tolist(), scene.is_person.tolist(), strict=True)):
+        if not 0.0 <= gap < (config.person_slow_gap if is_person else config.object_slow_gap):
             continue
-        owner, is_person = scene.owners[row], scene.is_person[row]
+        owner = scene.owners[row]
         is_slow = scene.speeds[owner] < _SLOW_MOVER and scene.classes[owner] != _VEHICLE
-        if gap < (config.person_slow_gap if is_person else config.object_slow_gap) and (
-            is_slow or scene.is_standing[owner]
-        ):
+        if is_slow or scene.is_standing[owner]:
             slowest, more = _SLOW_FOR_PERSON if is_person else _SLOW_FOR_OBJECT
             creeps = is_person and scene.is_standing[owner] and gap < config.person_margin
             speeds.append((row, _CREEPING, _ROOM_TO_CREEP) if creeps else (row, slowest + more * gap, 0.0))
