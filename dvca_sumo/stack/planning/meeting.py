@@ -171,7 +171,8 @@ class Meetings:
         speeds = scene.speeds[scene.owners[rows]]
         stations, offsets = scene.futures.stations[rows], scene.futures.offsets[rows]
         ways = np.hypot(stations[:, 1:] - stations[:, :-1], offsets[:, 1:] - offsets[:, :-1]).cumsum(axis=1)
-        times = np.tile(scene.times, (len(rows), 1))
+        times = np.empty((len(rows), len(scene.times)))
+        times[:] = scene.times
         keeps = speeds > self._config.standing_speed
         times[keeps, 1:] = np.minimum(times[keeps, 1:], ways[keeps] / speeds[keeps, None])
         return passes & self._is_gone(times - max(margin - _SLOWS, 0.0), rows, graph, profile)
@@ -179,14 +180,14 @@ class Meetings:
     def _is_gone(self, times: Floats, rows: list[int], graph: Graph, profile: Profile) -> Flags:
         """Whether at `times` [s] the ego has left the places that the futures `rows` occupy one after the other."""
         rear = np.interp(times, STEP_TIMES, profile.arcs) - self._shape.rear_overhang
-        gone: Flags = np.all((rear > graph.ends[rows]) | ~graph.occupied[rows], axis=1)
+        gone: Flags = np.logical_and.reduce((rear > graph.ends[rows]) | ~graph.occupied[rows], axis=1)
         return gone
 
     def _comes_after(self, rows: list[int], graph: Graph, profile: Profile) -> Flags:
         """Whether the ego comes to every place that a future occupies after that has gone."""
         times = graph.scene.times + self._config.clear_margin
         front = np.interp(times, STEP_TIMES, profile.arcs) + (self._shape.front + _CLEAR_GAP)
-        after: Flags = np.all((front < graph.begins[rows]) | ~graph.occupied[rows], axis=1)
+        after: Flags = np.logical_and.reduce((front < graph.begins[rows]) | ~graph.occupied[rows], axis=1)
         return after
 
     def _others_first(self, row: int, graph: Graph, views: list[LineView]) -> bool | None:

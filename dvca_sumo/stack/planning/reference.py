@@ -158,9 +158,9 @@ class Reference:
         for _ in range(_ITERATIONS):
             row = min(max(int(station) + BEHIND + 2, 0), self._table.shape[1] - 2)
             part = station + BEHIND + 2 - row
-            east, north, cosine, sine, heading, curvature = (
+            east, north, cosine, sine, heading, curvature = [
                 low + part * (high - low) for low, high in self._table[:6, row : row + 2].tolist()
-            )
+            ]
             ahead = (x - east) * cosine + (y - north) * sine
             across = (y - north) * cosine - (x - east) * sine
             if abs(ahead) < _CONVERGED:

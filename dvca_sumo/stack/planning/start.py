@@ -48,8 +48,7 @@ def _at(trajectory: Trajectory, time: float) -> StartState | None:
         return None
     (_, *low), (_, *high) = trajectory.points[first : first + 2].tolist()
     part = row - first
-    x, y, heading, speed, acceleration, curvature = (a + part * (b - a) for a, b in zip(low, high, strict=True))
-    return StartState(x, y, heading, speed, acceleration, curvature)
+    return StartState(*[a + part * (b - a) for a, b in zip(low, high, strict=True)])
 
 
 def _is_near(planned: StartState, localization: LocalizationEstimate, config: PlanningConfig) -> bool:
