@@ -207,28 +207,25 @@ def _points(path: Path, profile: Profile) -> Floats:
     Between rows of the path, headings are the cubic with the rows' curvatures as slopes, and curvatures are its slope:
     a plan that begins anew from any of its points, again and again, turns neither sooner nor later than it tells.
     """
-    arcs, speeds, accelerations = profile.rows()
-    points = np.empty((len(TRAJECTORY_TIMES), 7))
-    points[:, 0] = TRAJECTORY_TIMES
-    points[:, 4] = speeds
-    points[:, 5] = accelerations
+    columns = np.empty((7, len(TRAJECTORY_TIMES)))
+    times, x, y, headings, speeds, accelerations, curvatures = columns
+    times[:] = TRAJECTORY_TIMES
+    arcs, speeds[:], accelerations[:] = profile.rows()
     table = np.array((path.arcs, path.x, path.y, path.headings, path.curvatures))
     rows = path.arcs[1:-1].searchsorted(arcs, side="right")
     before, after = table.take(rows, axis=1), table.take(rows + 1, axis=1)
     steps, east, north, turned, _ = after - before
     ahead = arcs - before[0]
     parts = ahead / steps
-    points[:, 1] = east / steps * ahead + before[1]
-    points[:, 2] = north / steps * ahead + before[2]
     first, last = before[4] * steps, after[4] * steps
     third = first + last - 2.0 * turned
     second = turned - first - third
-    points[:, 3] = before[3] + parts * (first + parts * (second + parts * third))
-    points[:, 6] = (first + parts * (2.0 * second + 3.0 * parts * third)) / steps
-    bulge = 0.5 * points[:, 6] * parts * (1.0 - parts) * steps * steps  # of an arc over its chord
-    points[:, 1] += bulge * np.sin(points[:, 3])
-    points[:, 2] -= bulge * np.cos(points[:, 3])
-    return points
+    np.add(parts * (first + parts * (second + parts * third)), before[3], out=headings)
+    np.divide(first + parts * (2.0 * second + 3.0 * parts * third), steps, out=curvatures)
+    bulge = 0.5 * curvatures * parts * (1.0 - parts) * steps * steps  # of an arc over its chord
+    np.add(east / steps * ahead + before[1], bulge * np.sin(headings), out=x)
+    np.subtract(north / steps * ahead + before[2], bulge * np.cos(headings), out=y)
+    return columns.T
 
 
 def _braking(start: StartState, braking: float) -> Floats:

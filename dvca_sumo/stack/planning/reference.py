@@ -196,8 +196,8 @@ def swept(points: Floats, headings: Floats, line: Floats, shape: VehicleShape) -
     by_station = spots[:, : metres * stations].reshape(2, metres, stations)
     by_axle = spots.reshape(2, metres, stations + 1)[:, :, :count]
     by_station[:] = points[:, None]  # where the axle has come from too near
-    by_axle[0] = ahead * np.cos(headings[:count])
-    by_axle[1] = ahead * np.sin(headings[:count])
+    np.multiply(ahead, np.cos(headings[:count]), out=by_axle[0])
+    np.multiply(ahead, np.sin(headings[:count]), out=by_axle[1])
     by_axle += points[:, None, :count]
     by_station -= line[:2, None]
     offsets = by_station[1] * line[2]

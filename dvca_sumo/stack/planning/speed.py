@@ -68,13 +68,14 @@ class Profile(msgspec.Struct, frozen=True, eq=False):
         arcs[::2], speeds[::2], accelerations[::2] = self.arcs, self.speeds, self.accelerations
         s, v, a = self.arcs[:-1], self.speeds[:-1], self.accelerations[:-1]
         half, rise = 0.5 * STEP, 0.5 * (self.accelerations[1:] - a)
-        accelerations[1::2] = a + rise
+        np.add(a, rise, out=accelerations[1::2])
         middles = v + half * (a + 0.5 * rise)
         if np.count_nonzero(self.speeds) < len(self.speeds):
             is_stopping = (v > 0.0) & (self.speeds[1:] == 0.0)
             middles[is_stopping] = 0.5 * v[is_stopping] - _STANDSTILL
-        speeds[1::2] = np.maximum(middles, 0.0)
-        arcs[1::2] = np.minimum(np.maximum(s + half * (v + half * (0.5 * a + rise / 6.0)), s), self.arcs[1:])
+        np.maximum(middles, 0.0, out=speeds[1::2])
+        reached = s + half * (v + half * (0.5 * a + rise / 6.0))
+        np.minimum(np.maximum(reached, s), self.arcs[1:], out=arcs[1::2])
         return arcs, speeds, accelerations
 
 
