@@ -14,9 +14,10 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.angles import wrapped
-from dvca_sumo.messages import HEADING, ControlCommand, LocalizationEstimate, Trajectory, VehicleShape, X, Y
+from dvca_sumo.messages import HEADING, ControlCommand, LocalizationEstimate, T, Trajectory, VehicleShape, X
 
 _SQRT2 = math.sqrt(2.0)
+_READ = 16  # rows of a trajectory that are read at first
 
 
 class ControlConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -48,38 +49,53 @@ Place = tuple[int, float]  # row of a trajectory, and how far on to the next one
 
 
 class _Track:
-    """A trajectory as plain numbers, looked up by time or by distance along it; ends are held."""
+    """A trajectory as plain numbers, looked up by time or by distance along it; ends are held.
+
+    They are read as far as anything is looked up: most of it is replaced before its time comes.
+    """
 
     def __init__(self, trajectory: Trajectory) -> None:
         points = trajectory.points
-        steps = points[1:] - points[:-1]
-        headings = points[:, HEADING].copy()
-        headings[1:] -= 2.0 * math.pi * np.rint(steps[:, HEADING] / (2.0 * math.pi)).cumsum()  # np.unwrap, but fast
+        columns = np.zeros((8, len(points)))
+        columns[:7] = points.T
+        poses = columns[X : HEADING + 1]
+        east, north, turned = poses[:, 1:] - poses[:, :-1]
+        columns[HEADING, 1:] -= 2.0 * math.pi * np.rint(turned / (2.0 * math.pi)).cumsum()  # np.unwrap, but fast
+        np.hypot(east, north).cumsum(out=columns[7, 1:])
         self.source = trajectory
         self.is_finite = bool(np.isfinite(points).all())
-        self.times, x, y, _, self.speeds, self.accelerations, self.curvatures = points.T.tolist()
-        self._poses: list[Pose] = list(zip(x, y, headings.tolist(), strict=True))
-        self.stations: list[float] = [0.0, *np.hypot(steps[:, X], steps[:, Y]).cumsum().tolist()]
+        self.end = float(points[-1, T])  # [s]
+        self._rest = columns[:, _READ:]
+        self._lists = columns[:, :_READ].tolist()
+        self.times, self._x, self._y, self._headings = self._lists[:4]
+        self.speeds, self.accelerations, self.curvatures, self.stations = self._lists[4:]
+
+    def place(self, knots: list[float], value: float) -> Place:
+        """Where `value` lies among `knots`, the times or the stations."""
+        if value >= knots[-1] and self._rest.size:
+            for numbers, more in zip(self._lists, self._rest.tolist(), strict=True):
+                numbers.extend(more)
+            self._rest = self._rest[:, :0]
+        i = bisect_right(knots, value, 1, len(knots) - 1) - 1
+        start = knots[i]
+        width = knots[i + 1] - start
+        share = (value - start) / width if width > 0.0 else 1.0
+        if share >= 1.0:
+            return i, 1.0
+        if share > 0.0:
+            return i, share
+        return i, 0.0
 
     def pose(self, place: Place) -> Pose:
         """The pose at `place`."""
         i, share = place
-        x, y, heading = self._poses[i]
-        x1, y1, heading1 = self._poses[i + 1]
-        return x + share * (x1 - x), y + share * (y1 - y), heading + share * (heading1 - heading)
-
-
-def _place(knots: list[float], value: float) -> Place:
-    """Where `value` lies among ascending `knots`."""
-    i = bisect_right(knots, value, 1, len(knots) - 1) - 1
-    start = knots[i]
-    width = knots[i + 1] - start
-    share = (value - start) / width if width > 0.0 else 1.0
-    if share >= 1.0:
-        return i, 1.0
-    if share > 0.0:
-        return i, share
-    return i, 0.0
+        x, y, heading = self._x[i], self._y[i], self._headings[i]
+        i += 1
+        return (
+            x + share * (self._x[i] - x),
+            y + share * (self._y[i] - y),
+            heading + share * (self._headings[i] - heading),
+        )
 
 
 def _at(place: Place, values: list[float]) -> float:
@@ -113,13 +129,13 @@ class TrackingController:
         if self._track is None or self._track.source is not trajectory:
             self._track = _Track(trajectory)
         track, age = self._track, now - trajectory.time
-        if age > track.times[-1] or not track.is_finite:
+        if age > track.end or not track.is_finite:
             return self._stop(now)
-        wanted = _place(track.times, age)
+        wanted = track.place(track.times, age)
         ahead = _along(track.pose(wanted), localization)  # [m] the ego is past where it should be by now
         # One Newton step corrects the first guess, which is off where a large error meets a bend.
         reached = _at(wanted, track.stations) + ahead
-        reached += _along(track.pose(_place(track.stations, reached)), localization)
+        reached += _along(track.pose(track.place(track.stations, reached)), localization)
         return ControlCommand(
             time=now,
             acceleration=self._acceleration(localization.speed, wanted, reached, track, age),
@@ -132,23 +148,23 @@ class TrackingController:
 
     def _steering(self, localization: LocalizationEstimate, track: _Track, station: float) -> float:
         config, speed = self._config, localization.speed
-        x, y, heading = track.pose(_place(track.stations, station))
+        x, y, heading = track.pose(track.place(track.stations, station))
         dx, dy = localization.x - x, localization.y - y
         offset = math.cos(heading) * dy - math.sin(heading) * dx
         error = wrapped(localization.heading - heading)
         distance = max(config.min_settling_distance, speed * config.settling_time)
         # Regulated to the heading at which offset and heading terms cancel: that one is limited.
         approach = _limited(offset / (_SQRT2 * distance), config.max_approach_angle)
-        ahead = _place(track.stations, station + speed * config.steering_preview)
+        ahead = track.place(track.stations, station + speed * config.steering_preview)
         curvature = _at(ahead, track.curvatures) - _SQRT2 / distance * (error + approach)
         most = config.max_lateral_acceleration / max(1.0, speed * speed)
         return _limited(math.atan(self._wheelbase * _limited(curvature, most)), config.max_steering)
 
     def _acceleration(self, speed: float, wanted: Place, reached: float, track: _Track, age: float) -> float:
         config = self._config
-        ahead = _place(track.times, age + config.acceleration_preview)
+        ahead = track.place(track.times, age + config.acceleration_preview)
         if _at(ahead, track.speeds) <= config.standstill_speed:
-            soon = _place(track.times, age + config.standstill_preview)
+            soon = track.place(track.times, age + config.standstill_preview)
             if _at(soon, track.speeds) <= config.standstill_speed:
                 self._integral = 0.0
                 return self._halting(speed, _at(soon, track.stations) - reached)
