@@ -63,8 +63,10 @@ class LaneChanges:
         if not rows:
             return candidates, drift
         owners = candidates.owners[rows]
-        places = self._paths.place(stretches_of(paths), np.array(guesses), tracked.boxes[owners])
-        changes = Candidates(owners, paths, likely[rows], places).chosen(np.flatnonzero(places.beyond == 0.0))
+        stretches = stretches_of(paths)
+        places = self._paths.place(stretches, np.array(guesses), tracked.boxes[owners])
+        everybody = Candidates(owners, paths, stretches, likely[rows], places)
+        changes = everybody.chosen(np.flatnonzero(places.beyond == 0.0))
         kept = np.ones(len(tracked.ids))
         kept[changes.owners] -= changes.probabilities
         keeping = candidates._replace(probabilities=candidates.probabilities * kept[candidates.owners])

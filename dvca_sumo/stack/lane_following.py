@@ -16,7 +16,7 @@ from dvca_sumo.geometry.angles import wrapped, wrapped_all
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.continuations import Traffic
-from dvca_sumo.stack.lane_paths import LanePath, LanePaths, Placements, stretches_of
+from dvca_sumo.stack.lane_paths import LanePath, LanePaths, Placements, Stretches, stretches_of
 
 _NO_FIT = 1e30  # a misfit beyond that of any lane an object fits
 
@@ -40,13 +40,15 @@ class Candidates(NamedTuple):
 
     owners: Integers  # (h,) object rows
     paths: list[LanePath]  # (h,)
+    stretches: Stretches  # (h,) of the paths
     probabilities: Floats  # (h,) sum to 1 for each object
     placements: Placements  # (h,)
 
     def chosen(self, rows: Integers) -> "Candidates":
         """Only `rows`, in that order."""
+        paths, stretches = [self.paths[i] for i in rows], Stretches(*(column[rows] for column in self.stretches))
         placements = Placements(*(column[rows] for column in self.placements))
-        return Candidates(self.owners[rows], [self.paths[i] for i in rows], self.probabilities[rows], placements)
+        return Candidates(self.owners[rows], paths, stretches, self.probabilities[rows], placements)
 
 
 class Movers(NamedTuple):
@@ -105,13 +107,13 @@ class LaneFollowing:
         """Drops what is remembered of objects that are not in `tracks`."""
         self._anchors = {track: self._anchors[track] for track in tracks if track in self._anchors}
 
-    def find(self, tracks: Sequence[int], points: Floats, headings: Floats) -> None:
-        """Looks for the lanes of the objects that have none: (n,), (n, 2), (n,)."""
+    def find(self, rows: Iterable[int], tracks: Sequence[int], points: Floats, headings: Floats) -> None:
+        """Looks for the lanes of the objects `rows` that have none; of all objects are given (n,), (n, 2), (n,)."""
         wanted = []
-        for row, track in enumerate(tracks):
-            anchor = self._anchors.get(track)
+        for row in rows:
+            anchor = self._anchors.get(tracks[row])
             if anchor is None:
-                anchor = self._anchors[track] = _Anchor()
+                anchor = self._anchors[tracks[row]] = _Anchor()
             if anchor.places:
                 continue
             x, y = points[row].tolist()
@@ -132,7 +134,7 @@ class LaneFollowing:
         for i in lost:
             self._anchors[movers.tracks[i]] = _Anchor()
         again = movers.again(lost)
-        self.find(again.tracks, again.boxes[:, :2], again.headings)
+        self.find(range(len(lost)), again.tracks, again.boxes[:, :2], again.headings)
         more, _ = self._followed(again)
         return joined(found, more)
 
@@ -151,7 +153,8 @@ class LaneFollowing:
                     priors.append(probability)
                     guesses.append(station)
         objects = np.array(owners, dtype=np.int64)
-        places = self._paths.place(stretches_of(paths), np.array(guesses), movers.boxes[objects])
+        stretches = stretches_of(paths)
+        places = self._paths.place(stretches, np.array(guesses), movers.boxes[objects])
         config = self._config
         errors = wrapped_all(movers.headings[objects] - places.headings)
         fits = (
@@ -160,12 +163,11 @@ class LaneFollowing:
             & (places.beyond == 0.0)
         )
         misfit = (places.offsets / config.offset_sigma) ** 2 + (errors / config.heading_sigma) ** 2
-        candidates = Candidates(objects, paths, np.array(priors) * fits, places)
+        candidates = Candidates(objects, paths, stretches, np.array(priors) * fits, places)
         shared = self._shared(candidates, misfit, len(movers.tracks))
         lost = sorted(set(owners).difference(shared.owners.tolist()))
         self._advance(shared, movers.tracks)
-        rows = movers.rows[shared.owners]
-        return Candidates(rows, shared.paths, shared.probabilities, shared.placements), lost
+        return shared._replace(owners=movers.rows[shared.owners]), lost
 
     def _shared(self, candidates: Candidates, misfit: Floats, count: int) -> Candidates:
         """Priors times Gaussian likelihood, as probabilities; what does not fit or is unlikely is dropped."""
@@ -178,7 +180,8 @@ class LaneFollowing:
         weights /= np.maximum(np.bincount(owners, weights, count), 1e-12)[owners]
         weights[weights < self._config.min_share] = 0.0
         weights /= np.maximum(np.bincount(owners, weights, count), 1e-12)[owners]
-        shared, kept = Candidates(owners, candidates.paths, weights, candidates.placements), weights.nonzero()[0]
+        shared = Candidates(owners, candidates.paths, candidates.stretches, weights, candidates.placements)
+        kept = weights.nonzero()[0]
         return shared if len(kept) == len(weights) else shared.chosen(kept)
 
     def _advance(self, candidates: Candidates, tracks: Sequence[int]) -> None:
@@ -224,7 +227,8 @@ class LaneFollowing:
 def joined(one: Candidates, other: Candidates) -> Candidates:
     """Both, by ascending object row."""
     owners = np.concatenate([one.owners, other.owners])
+    stretches = Stretches(*map(np.concatenate, zip(one.stretches, other.stretches, strict=True)))
     placements = Placements(*map(np.concatenate, zip(one.placements, other.placements, strict=True)))
     probabilities = np.concatenate([one.probabilities, other.probabilities])
-    everything = Candidates(owners, [*one.paths, *other.paths], probabilities, placements)
+    everything = Candidates(owners, [*one.paths, *other.paths], stretches, probabilities, placements)
     return everything.chosen(np.argsort(owners, kind="stable"))

@@ -29,16 +29,16 @@ _WINDOW = np.arange(-8, 9)  # columns (metres) around a guessed station that a p
 
 
 class LanePath(msgspec.Struct, frozen=True, eq=False):
-    """Lanes in driving order, as columns `first` ... `first + count - 1` of the table."""
+    """Lanes in driving order, as columns `first` ... `last` of the table."""
 
     lanes: tuple[str, ...]
     starts: tuple[float, ...]  # [m] station at which each lane begins
     first: int
-    count: int
+    last: int
 
     def lane_at(self, station: float) -> int:
         """Index in `lanes` of the lane at `station` [m]."""
-        return max(0, bisect_right(self.starts, station) - 1)
+        return bisect_right(self.starts, station, 1) - 1
 
     def lanes_between(self, start: float, end: float) -> tuple[str, ...]:
         """The lanes from station `start` to station `end` [m]."""
@@ -169,7 +169,8 @@ class LanePaths:
                 np.array([part.speed_limit for part in parts])[which],
             ]
         )
-        return LanePath(lanes, tuple(starts.tolist()), self._stored(columns), len(poses))
+        first = self._stored(columns)
+        return LanePath(lanes, tuple(starts.tolist()), first, first + len(poses) - 1)
 
     def _bend_speeds(self, headings: Floats) -> Floats:
         """The speed at each column that leaves time to brake for the bends ahead [m/s]."""
@@ -192,5 +193,5 @@ class LanePaths:
 
 def stretches_of(paths: Sequence[LanePath]) -> Stretches:
     """Where `paths` (h,) lie in the table."""
-    ends = np.array([(path.first, path.first + path.count - 1) for path in paths], dtype=np.int64).reshape(-1, 2)
-    return Stretches(ends[:, 0], ends[:, 1])
+    first = np.array([path.first for path in paths], dtype=np.int64)
+    return Stretches(first, np.array([path.last for path in paths], dtype=np.int64))

@@ -17,7 +17,7 @@ from dvca_sumo.stack.hypotheses import Hypotheses, message_of
 from dvca_sumo.stack.lane_changes import LaneChangeConfig, LaneChanges, lateral_speeds
 from dvca_sumo.stack.lane_following import Candidates, LaneFollowing, LaneMatchConfig, Movers
 from dvca_sumo.stack.lane_motion import LaneMotion, MotionModelConfig
-from dvca_sumo.stack.lane_paths import LanePaths, stretches_of
+from dvca_sumo.stack.lane_paths import LanePaths
 from dvca_sumo.stack.walking import Walking, WalkingConfig
 
 # Comparing an array with an enumeration's member costs numpy ten times as much as with a number.
@@ -100,12 +100,12 @@ class MapPrediction:
 
     def _on_lanes(self, tracked: TrackedObjects, speeds: Floats, reaches: Floats, elapsed: float) -> Candidates:
         """Moving vehicles and bicycles that follow lanes. Standing ones keep the lane they have."""
-        tracks, points, velocities = tracked.ids.tolist(), tracked.boxes[:, :2], tracked.velocities
+        tracks, velocities = tracked.ids.tolist(), tracked.velocities
         is_fast = speeds > self._config.direction_speed
         headings = np.where(is_fast, np.arctan2(velocities[:, 1], velocities[:, 0]), tracked.boxes[:, 2])
         self._following.forget_all_but(tracks)
         wheeled = _is_wheeled(tracked).nonzero()[0]
-        self._following.find([tracks[row] for row in wheeled.tolist()], points[wheeled], headings[wheeled])
+        self._following.find(wheeled.tolist(), tracks, tracked.boxes[:, :2], headings)
         moving = wheeled[speeds[wheeled] >= self._config.standing_speed]
         return self._following.follow(
             Movers(
@@ -128,10 +128,10 @@ class MapPrediction:
         """
         drifts = lateral_speeds(candidates, tracked.velocities)
         candidates, drifts = self._changes.added(candidates, drifts, tracked, reaches)
-        owners, paths, probabilities, places = candidates
+        owners, paths, along, probabilities, places = candidates
         if not len(owners):
             return Hypotheses(owners, probabilities, np.empty((0, len(PREDICTION_TIMES), 3)), [])
-        along, boxes = stretches_of(paths), tracked.boxes.take(owners, axis=0)
+        boxes = tracked.boxes.take(owners, axis=0)
         own = self._nose_speeds(tracked.velocities[owners], boxes[:, 2], places.steering)
         own_trends = np.where(np.abs(places.steering) <= self._config.straight, trends[owners], 0.0)
         stations = self._motion.travelled(along, places.stations, own, own_trends, float(reaches[owners].max()))
