@@ -179,7 +179,6 @@ def mutual_nearest(costs: Floats, gate: float) -> tuple[Integers, Integers]:
     """
     if costs.size == 0:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    costs = np.where(costs < gate, costs, np.inf)
     every = np.arange(costs.shape[0])
     matches = np.full(costs.shape[0], -1)
     while True:
@@ -189,6 +188,7 @@ def mutual_nearest(costs: Floats, gate: float) -> tuple[Integers, Integers]:
         matched = (matches >= 0).nonzero()[0]
         if matched.size == min(costs.shape) or not is_mutual.any():
             return matched, matches[matched]
+        costs = costs.copy()
         costs[is_mutual] = np.inf
         costs[:, cheapest[is_mutual]] = np.inf
 

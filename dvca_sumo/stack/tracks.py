@@ -44,7 +44,7 @@ class Tracks:
 
     def __init__(self, config: MotionConfig) -> None:
         self._config = config
-        self._accelerations = np.array(config.accelerations)
+        self._acceleration_variances = np.array(config.accelerations) ** 2
         self._first_variances = np.array(config.first_speeds) ** 2
         self._next_id = 1
         self.ids: Integers = np.zeros(0, dtype=np.int64)
@@ -63,7 +63,7 @@ class Tracks:
         transition[0, 2] = transition[1, 3] = dt
         a, b, c = dt**4 / 4.0, dt**3 / 2.0, dt**2
         noise = np.array([[a, 0.0, b, 0.0], [0.0, a, 0.0, b], [b, 0.0, c, 0.0], [0.0, b, 0.0, c]])
-        variances = self._accelerations[self.classes] ** 2
+        variances = self._acceleration_variances[self.classes]
         self.means = self.means @ transition.T
         self.covariances = transition @ self.covariances @ transition.T + variances[:, None, None] * noise
         self.sweeps = self.sweeps + 1
