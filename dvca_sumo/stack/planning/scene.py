@@ -14,7 +14,6 @@ IN_LANE = 1.2  # [m] vehicles whose middle is this near the middle of a lane are
 ALONG = 0.5  # cosine of the largest angle (60 degrees) to a lane or path at which someone drives along it, not across
 SOON = int(np.searchsorted(PREDICTION_TIMES, 1.0))  # far enough to tell going from staying, too near for a guess
 SOON_TIME = float(PREDICTION_TIMES[SOON])  # [s]
-_ENDS = np.array([[0.0], [-1.0], [1.0]])  # middle, near and far end, in half lengths
 _SPARSE = 4  # every so many times of a hypothesis do to bound it
 _FEW = 8  # hypotheses are placed in less time than it takes to find out which are far away
 _AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
@@ -88,6 +87,8 @@ def scene_in(
     on = dict(zip(predicted.owners.tolist(), predicted.lanes, strict=True))
     now, futures, rows_now, rows_then = _extents(window, objects.boxes, poses, owners, still)
     owners = np.concatenate((owners, still))
+    probabilities = np.ones(len(owners))
+    probabilities[: len(rows)] = predicted.probabilities[rows]
     return Scene(
         ids=ids,
         classes=objects.classes,
@@ -99,7 +100,7 @@ def scene_in(
         times=PREDICTION_TIMES - (time - predicted.time),
         owners=owners,
         is_person=is_person[owners],
-        probabilities=np.concatenate((predicted.probabilities[rows], np.ones(len(still)))),
+        probabilities=probabilities,
         lanes=[predicted.lanes[row] for row in rows.tolist()] + [on.get(row, ()) for row in still.tolist()],
         futures=futures,
         rows=rows_then,
@@ -153,7 +154,12 @@ def _extents(
     halves = 0.5 * boxes[:, 3:].T
     halves = np.concatenate((halves, halves.take(owners, axis=1).repeat(times, axis=1)), axis=1)
     placed = _placed(window, flat, halves)
-    rows = window.index(placed[0] + _ENDS * placed[2])
+    stations, half_lengths = placed[0], placed[2]
+    ends = np.empty((3, len(flat)))
+    ends[0] = stations
+    np.subtract(stations, half_lengths, out=ends[1])
+    np.add(stations, half_lengths, out=ends[2])
+    rows = window.index(ends)
     now, rows_now = placed[:, :count], rows[:, :count]
     futures = np.empty((5, moving + len(still), times))
     futures[:, :moving] = placed[:, count:].reshape(5, moving, times)
