@@ -31,13 +31,14 @@ class Plateau(NamedTuple):
 
 
 class Path(msgspec.Struct, frozen=True, eq=False):
-    """Geometry of the plan for the rear axle; row i lies at station i of the window."""
+    """Geometry of the plan for the rear axle; place i lies at station i of the window."""
 
+    rows: Floats  # (5, n), the next five
+    arcs: Floats  # (n,) [m] length of path from place 0
     x: Floats  # (n,) [m]
     y: Floats  # (n,) [m]
     headings: Floats  # (n,) [rad], continuous
     curvatures: Floats  # (n,) [1/m]
-    arcs: Floats  # (n,) [m] length of path from row 0
     left: Floats  # (BEHIND + n,) rows of the window: leftmost offset that the body sweeps at each station [m]
     right: Floats  # (BEHIND + n,) rightmost [m]
 
@@ -71,8 +72,8 @@ def path_along(
     (offsets, slopes), bend = _profile(_moves(lateral, plateaus, start.speed, window, shape, config), lateral, count)
     line = window.rows[:6, BEHIND:]
     _, _, cosines, sines, line_headings, line_curvatures = line
-    points = np.empty((2, count))
-    x, y = points
+    rows = np.empty((5, count))
+    arcs, x, y, headings, curvatures = rows
     np.subtract(line[0], offsets * sines, out=x)
     np.add(line[1], offsets * cosines, out=y)
     fade = _FADE[:count]  # near the end of the line the window is short
@@ -84,13 +85,14 @@ def path_along(
     angles, turns = np.arctan(tangents), np.zeros(count)
     turns[0] = bend * cosines_to_line[0] * cosines_to_line[0] / scale[0]
     turns[1:-1] = 0.5 * (angles[2:] - angles[:-2])  # what they are at a row says little of moves as short as rows are
-    arcs = np.zeros(count)
-    np.hypot(*(points[:, 1:] - points[:, :-1])).cumsum(out=arcs[1:])
-    headings = line_headings + angles
+    np.add(line_headings, angles, out=headings)
+    np.divide((line_curvatures + turns) * cosines_to_line, scale, out=curvatures)
+    arcs[0] = 0.0
+    np.hypot(x[1:] - x[:-1], y[1:] - y[:-1]).cumsum(out=arcs[1:])
     sides = np.empty((2, BEHIND + count))
-    sides[:, BEHIND:] = swept(points, headings, line[:4], shape)
+    sides[:, BEHIND:] = swept(rows[1:3], headings, line[:4], shape)
     sides[:, :BEHIND] = sides[:, BEHIND : BEHIND + 1]
-    return Path(x, y, headings, (line_curvatures + turns) * cosines_to_line / scale, arcs, *sides)
+    return Path(rows, *rows, *sides)
 
 
 def way_back(

@@ -211,9 +211,8 @@ def _points(path: Path, profile: Profile) -> Floats:
     times, x, y, headings, speeds, accelerations, curvatures = columns
     times[:] = TRAJECTORY_TIMES
     arcs, speeds[:], accelerations[:] = profile.rows()
-    table = np.array((path.arcs, path.x, path.y, path.headings, path.curvatures))
-    rows = path.arcs[1:-1].searchsorted(arcs, side="right")
-    before, after = table.take(rows, axis=1), table.take(rows + 1, axis=1)
+    places = path.arcs[1:-1].searchsorted(arcs, side="right")
+    before, after = path.rows.take(places, axis=1), path.rows.take(places + 1, axis=1)
     steps, east, north, turned, _ = after - before
     ahead = arcs - before[0]
     parts = ahead / steps

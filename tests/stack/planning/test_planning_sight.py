@@ -25,7 +25,8 @@ def straight(begin: float) -> Path:
     """Along the road from a rear axle at x = `begin`."""
     x: Floats = np.arange(begin, begin + 100.0)
     zeros = np.zeros(len(x))
-    return Path(x=x, y=zeros, headings=zeros, curvatures=zeros, arcs=x - begin, left=zeros, right=zeros)
+    rows = np.array((x - begin, x, zeros, zeros, zeros))
+    return Path(rows, x - begin, x, zeros, zeros, zeros, left=zeros, right=zeros)
 
 
 @functools.cache
