@@ -39,11 +39,12 @@ def ahead(graph: Graph, speed: float, shape: VehicleShape, config: PlanningConfi
         occupied[people] = counts & _met(people, graph, speed, shape, config)
     rows = occupied.nonzero()[0]
     ways = np.where(rows < scene.moving, graph.low[rows, _SOON] - graph.low[rows, 0], -np.inf)
-    order = np.lexsort((ways, scene.owners[rows]))
-    rows, ways = rows[order], ways[order]
-    is_slowest = np.ones(len(rows), dtype=np.bool_)
-    is_slowest[1:] = scene.owners[rows[1:]] != scene.owners[rows[:-1]]
-    rows, ways = rows[is_slowest], ways[is_slowest]
+    if len(rows) > 1:
+        order = np.lexsort((ways, scene.owners[rows]))
+        rows, ways = rows[order], ways[order]
+        is_slowest = np.ones(len(rows), dtype=np.bool_)
+        is_slowest[1:] = scene.owners[rows[1:]] != scene.owners[rows[:-1]]
+        rows, ways = rows[is_slowest], ways[is_slowest]
     begun = np.array(graph.first, dtype=np.int64)[rows]
     rears, fronts = graph.low[rows, begun] - shape.front, graph.high[rows, begun] - shape.front
     owners, stands, is_person = scene.owners[rows], ways < _CREEPS, scene.is_person[rows]

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from dvca_sumo.messages import Flags, Floats, VehicleShape
+from dvca_sumo.messages import Flags, Floats, Integers, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView, has_priority
 from dvca_sumo.stack.planning.scene import ALONG, SOON, SOON_TIME
@@ -52,8 +52,9 @@ class Meetings:
         """What the futures `rows` ask of an ego that would otherwise drive `profile`."""
         if not rows:
             return []
-        settled = self._comes_after(rows, graph, profile)
-        settled |= self._passes(rows, graph, profile, self._config.pass_margin)
+        those = np.array(rows)
+        settled = self._comes_after(those, graph, profile)
+        settled |= self._passes(those, graph, profile, self._config.pass_margin)
         found = (
             self._demand(row, graph, views, profile)
             for row, is_settled in zip(rows, settled.tolist(), strict=True)
@@ -159,7 +160,7 @@ class Meetings:
         )
         return way < (speed + _SPEEDS_UP) * SOON_TIME
 
-    def _passes(self, rows: list[int], graph: Graph, profile: Profile, margin: float) -> Flags:
+    def _passes(self, rows: Integers | list[int], graph: Graph, profile: Profile, margin: float) -> Flags:
         """Whether the ego has left every place that a future occupies `margin` [s] before it comes there.
 
         It does not count on anybody to slow down: ahead of one that keeps its speed it still is, by `_SLOWS` less.
@@ -177,13 +178,13 @@ class Meetings:
         times[keeps, 1:] = np.minimum(times[keeps, 1:], ways[keeps] / speeds[keeps, None])
         return passes & self._is_gone(times - max(margin - _SLOWS, 0.0), rows, graph, profile)
 
-    def _is_gone(self, times: Floats, rows: list[int], graph: Graph, profile: Profile) -> Flags:
+    def _is_gone(self, times: Floats, rows: Integers | list[int], graph: Graph, profile: Profile) -> Flags:
         """Whether at `times` [s] the ego has left the places that the futures `rows` occupy one after the other."""
         rear = np.interp(times, STEP_TIMES, profile.arcs) - self._shape.rear_overhang
         gone: Flags = np.logical_and.reduce((rear > graph.ends[rows]) | ~graph.occupied[rows], axis=1)
         return gone
 
-    def _comes_after(self, rows: list[int], graph: Graph, profile: Profile) -> Flags:
+    def _comes_after(self, rows: Integers, graph: Graph, profile: Profile) -> Flags:
         """Whether the ego comes to every place that a future occupies after that has gone."""
         times = graph.scene.times + self._config.clear_margin
         front = np.interp(times, STEP_TIMES, profile.arcs) + (self._shape.front + _CLEAR_GAP)

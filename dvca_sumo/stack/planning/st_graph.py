@@ -286,13 +286,15 @@ def leader_of(rows: list[int], graph: Graph, shape: VehicleShape) -> Leader | No
     scene, those = graph.scene, np.array(rows)
     low, first = graph.low[those], np.array([graph.first[row] for row in rows])
     comes = (scene.futures.directions[those, 0] < 0.0) & (scene.times[first] <= PRESENT)
-    is_there = graph.occupied[those] | (comes[:, None] & (first[:, None] > _COLUMNS))
-    places = np.where(is_there, low - shape.front, _NEVER)
+    is_there = graph.occupied[those]
+    if np.count_nonzero(comes):
+        is_there |= comes[:, None] & (first[:, None] > _COLUMNS)
+    places, paces = np.where(is_there, low - shape.front, _NEVER), (low[:, 1:] - low[:, :-1]) / PREDICTION_STEP
     nearest = places.argmin(axis=0)
     rears, speeds, times = np.empty((3, len(nearest) + 1))
-    rears[:-1] = places[nearest, _COLUMNS]
-    speeds[:-2] = (low[nearest[:-1], _COLUMNS[1:]] - low[nearest[:-1], _COLUMNS[:-1]]) / PREDICTION_STEP
-    speeds[-2:] = (low[nearest[-1], -1] - low[nearest[-1], -2]) / PREDICTION_STEP
+    np.minimum.reduce(places, out=rears[:-1])
+    speeds[:-2] = paces[nearest[:-1], _COLUMNS[:-1]]
+    speeds[-2:] = paces[nearest[-1], -1]
     times[:-1], times[-1] = scene.times, STEP_TIMES[-1]
     rears[-1] = rears[-2] + (times[-1] - times[-2]) * speeds[-1]
     track = graph.track(rows[nearest[(rears < _NEVER).argmax()]])
