@@ -70,9 +70,8 @@ def feasible_length(move: Move, speed: float, window: Window, config: PlanningCo
     length = max(length, _SHORTEST_REST)
     while True:
         terms, squared = _terms(state, target, length), length * length
-        rows = [_row(window, begin + u * length) for u in _SAMPLES]
-        for u, line in zip(_SAMPLES, window.curvatures[rows].tolist(), strict=True):
-            bend = _second(terms, u) / squared
+        for u in _SAMPLES:
+            line, bend = window.curvatures.item(_row(window, begin + u * length)), _second(terms, u) / squared
             if abs(bend) > sharpest + (abs(line) if bend * line < 0.0 else 0.0):
                 break
         else:
