@@ -29,6 +29,9 @@ def waits(
     way of others, waits before that; where it is too late for that, and the stretch is short, those rules hold, too.
     """
     window, scene = graph.window.up_to_fold(), graph.scene
+    left, right = _beyond_lane(graph, window, views)
+    if left.max() <= 0.0 and right.max() <= 0.0:
+        return []
     futures, begun = scene.futures, slice(0, int(shape.front) + 1)
     if window is not graph.window:
         futures = extents(window, scene.boxes, scene.poses, scene.owners[: scene.moving])
@@ -36,9 +39,6 @@ def waits(
     comes: Flags = (directions[:, 0] < -ALONG) | (directions[:, -1] < -ALONG)
     comes &= ~scene.is_person[: scene.moving]
     if not np.count_nonzero(comes):
-        return []
-    left, right = _beyond_lane(graph, window, views)
-    if left.max() <= 0.0 and right.max() <= 0.0:
         return []
     found = []
     for row in comes.nonzero()[0].tolist():
