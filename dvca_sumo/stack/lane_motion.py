@@ -51,7 +51,7 @@ class LaneMotion:
         final = np.maximum(speeds + trends * config.trend_duration, 0.0)
         finals = (final * final)[:, None]
         # All in squares of speeds, so that one root is taken.
-        free = squares + 2.0 * trends[:, None] * metres
+        free = squares + (2.0 * trends)[:, None] * metres
         free = np.minimum(np.maximum(free, np.minimum(squares, finals)), np.maximum(squares, finals))
         slowing = squares - 2.0 * config.braking * metres
         pace = np.maximum(config.speeding, speeds / limits[:, 0])[:, None]
@@ -61,7 +61,7 @@ class LaneMotion:
         times = np.zeros(profile.shape)
         (2.0 / (profile[:, 1:] + profile[:, :-1])).cumsum(axis=1, out=times[:, 1:])
         # All rows in one interpolation: each is moved to a stretch of the time axis of its own.
-        apart = 2.0 * _LATE * np.arange(len(stations))[:, None]
+        apart = (2.0 * _LATE * np.arange(len(stations)))[:, None]
         wanted = (PREDICTION_TIMES + apart).ravel()
         known = (np.minimum(times, _LATE) + apart).ravel()
         distances: Floats = np.interp(wanted, known, np.concatenate([metres] * len(stations)))

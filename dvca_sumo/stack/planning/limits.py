@@ -56,7 +56,7 @@ def speed_caps(
     changes = np.abs(path.curvatures[_STEERED:] - path.curvatures[:-_STEERED])  # of as many metres each
     turning = config.steering_rate * _STEERED / (shape.wheelbase * np.maximum(changes, 1e-4))
     middle = slice(_STEERED // 2, _STEERED // 2 + len(turning))
-    caps[middle] = np.minimum(caps[middle], turning)
+    np.minimum(caps[middle], turning, out=caps[middle])
     slow = [(begin, end, config.peering_speed) for begin, end in blind]
     slow += _slow_stretches(speed, graph, views, crossings, shape, config)
     for begin, end, cap in slow:
