@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.angles import wrapped_all
-from dvca_sumo.messages import PREDICTION_TIMES, Flags, Floats, Integers, ObjectClass, PredictedObjects, TrackedObjects
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, PredictedObjects, TrackedObjects
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.continuations import Traffic
 from dvca_sumo.stack.hypotheses import Hypotheses, message_of
@@ -21,7 +21,8 @@ from dvca_sumo.stack.lane_paths import LanePaths
 from dvca_sumo.stack.walking import Walking, WalkingConfig
 
 # Comparing an array with an enumeration's member costs numpy ten times as much as with a number.
-_VEHICLE, _BICYCLE, _PERSON = int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
+_BICYCLE, _PERSON = int(ObjectClass.BICYCLE), int(ObjectClass.PEDESTRIAN)
+_LAST_ON_WHEELS = _BICYCLE  # vehicles and bicycles, by class number
 
 _LEAST_COSINE = 0.4  # of the angle between a body and where its nose goes
 
@@ -104,7 +105,7 @@ class MapPrediction:
         is_fast = speeds > self._config.direction_speed
         headings = np.where(is_fast, np.arctan2(velocities[:, 1], velocities[:, 0]), tracked.boxes[:, 2])
         self._following.forget_all_but(tracks)
-        wheeled = _is_wheeled(tracked).nonzero()[0]
+        wheeled = (tracked.classes <= _LAST_ON_WHEELS).nonzero()[0]
         self._following.find(wheeled.tolist(), tracks, tracked.boxes[:, :2], headings)
         moving = wheeled[speeds[wheeled] >= self._config.standing_speed]
         return self._following.follow(
@@ -179,9 +180,3 @@ def _told_apart(hypotheses: Hypotheses) -> Hypotheses:
     sums = np.zeros(len(lanes))
     np.add.at(sums, same, probabilities)
     return Hypotheses(owners[kept], sums[kept], poses[kept], [lanes[row] for row in kept])
-
-
-def _is_wheeled(tracked: TrackedObjects) -> Flags:
-    classes = tracked.classes
-    wheeled: Flags = (classes == _VEHICLE) | (classes == _BICYCLE)
-    return wheeled
