@@ -30,7 +30,7 @@ from dvca_sumo.stack.planning.scene import scene_in
 from dvca_sumo.stack.planning.settling import Settling
 from dvca_sumo.stack.planning.sight import Sights
 from dvca_sumo.stack.planning.situation import Situation
-from dvca_sumo.stack.planning.speed import Profile, Stop, roll_out
+from dvca_sumo.stack.planning.speed import Driver, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import Graph, graph_of, leader_of, leading
 from dvca_sumo.stack.planning.standing import Standing
 from dvca_sumo.stack.planning.start import StartState, start_state
@@ -61,6 +61,7 @@ class Planner:
         self._nudging = NudgeDecider(shape, config)
         self._settling = Settling(shape, config)
         self._standing = Standing()
+        self._driver = Driver(config)
         self._lanes = frozenset(route.lane_ids)
         self._meetings = Meetings(self._lanes, shape, config)
         self._previous: Trajectory | None = None
@@ -159,11 +160,11 @@ class Planner:
             stops.append(choice.keeping.stop)
         if choice.pace < math.inf:
             caps = [min(cap, choice.pace) for cap in caps]
-        profile = roll_out(start.speed, start.acceleration, caps, stops, leader, config)
+        profile = self._driver.roll_out(start.speed, start.acceleration, caps, stops, leader)
         waiting = waits(graph, views, profile, shape, config)
         if waiting:
             stops += waiting
-            profile = roll_out(start.speed, start.acceleration, caps, stops, leader, config)
+            profile = self._driver.roll_out(start.speed, start.acceleration, caps, stops, leader)
         demands: dict[int, Demand] = {}
         for _ in range(_ROUNDS):
             undecided = [row for row in others if row not in demands]
@@ -174,7 +175,7 @@ class Planner:
             joining = [demand.row for demand in demands.values() if demand.follows]
             leader = leader_of(leaders + joining, graph, shape)
             stops_now = [*stops, *_merged(demands, graph)]
-            profile = roll_out(start.speed, start.acceleration, caps, stops_now, leader, config)
+            profile = self._driver.roll_out(start.speed, start.acceleration, caps, stops_now, leader)
         yielding = {graph.track(row) for row in demands}
         self._meetings.settle({graph.track(row) for row in others} - yielding)
         return profile

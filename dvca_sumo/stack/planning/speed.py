@@ -86,112 +86,114 @@ def slowed_before(caps: Floats, arcs: Floats, braking: float) -> Floats:
     return np.sqrt(np.maximum(lowest - gained, 0.0))
 
 
-def roll_out(
-    speed: float,
-    acceleration: float,
-    caps: Sequence[float],
-    stops: Sequence[Stop],
-    leader: Leader | None,
-    config: PlanningConfig,
-) -> Profile:
-    """The motion from `speed` and `acceleration`; `caps` [m/s] by metre of path."""
-    s, v, a = 0.0, speed, acceleration
-    arcs, speeds, accelerations = [s], [v], [a]
-    label, last = "", caps[-1]
-    highest, lowest = config.acceleration, -config.comfort_braking
-    is_steady = leader is None and all(stop.until == math.inf for stop in stops)
-    for k in range(STEPS):
-        metre = int(s + v * _LOOK_AHEAD)
-        free = ((caps[metre] if metre < len(caps) else last) - v) / _LOOK_AHEAD
-        if free > highest:
-            free = highest
-        elif free < lowest:
-            free = lowest
-        wanted, because = free, ""
-        for stop in stops:
-            allowed = _for_stop(stop, s, v, k * STEP, config)
-            if allowed < wanted:
-                wanted, because = allowed, stop.label
-        if leader is not None:
-            allowed = _for_leader(leader.rears[k] - s, v, leader.speeds[k], config)
-            if allowed < wanted:
-                wanted, because = allowed, leader.label
-        if not label and k < _EXPLAINED and wanted < free - _NOTICEABLE:
-            label = because
-        if is_steady and wanted <= 0.0 and v == a == 0.0:  # it stands for the rest
-            arcs += [s] * (STEPS - k)
-            speeds += [0.0] * (STEPS - k)
-            accelerations += [0.0] * (STEPS - k)
-            break
-        s, v, a = _moved(s, v, a, wanted, config)
-        arcs.append(s)
-        speeds.append(v)
-        accelerations.append(a)
-    motion = np.array((arcs, speeds, accelerations))
-    return Profile(motion[0], motion[1], motion[2], label)
+class Driver:
+    """The driver model, under one configuration."""
 
+    def __init__(self, config: PlanningConfig) -> None:
+        self._config = config
+        self._highest, self._lowest = config.acceleration, -config.comfort_braking  # [m/s^2] in comfort
+        self._approach = math.sqrt(config.acceleration * config.braking)  # [m/s^2] of the intelligent driver model
+        self._change, self._hard_change = config.jerk * STEP, config.hard_jerk * STEP  # [m/s^2] in one step
 
-def _for_stop(stop: Stop, s: float, v: float, time: float, config: PlanningConfig) -> float:
-    """Stopping there or, where the ego need not stop to arrive no earlier than the way becomes free, that."""
-    distance = stop.at - s
-    if stop.until < math.inf:
-        left = stop.until - time
-        if left <= 0.0:
-            return config.acceleration
-        if 2.0 * distance > v * left:
-            return 2.0 * (distance - v * left) / (left * left)
-    if v < _HOLD_SPEED and distance < _HOLD_GAP:
-        allowed = _HOLD
-    elif distance > _TOUCH:
-        needed = v * v / (2.0 * distance)
-        allowed = max(config.acceleration - needed * needed / config.braking, -_FIRMER * needed)
-    else:
-        allowed = -config.hard_braking
-    if allowed < -config.comfort_braking:
-        firmest = _FIRMER * v * v / (2.0 * max(distance + stop.give, _TOUCH))
-        allowed = max(allowed, -max(config.comfort_braking, firmest))
-    return allowed
+    def roll_out(
+        self, speed: float, acceleration: float, caps: Sequence[float], stops: Sequence[Stop], leader: Leader | None
+    ) -> Profile:
+        """The motion from `speed` and `acceleration`; `caps` [m/s] by metre of path."""
+        s, v, a = 0.0, speed, acceleration
+        arcs, speeds, accelerations = [s], [v], [a]
+        label, count, last = "", len(caps), caps[-1]
+        highest, lowest = self._highest, self._lowest
+        is_steady = leader is None and all(stop.until == math.inf for stop in stops)
+        for k in range(STEPS):
+            metre = int(s + v * _LOOK_AHEAD)
+            free = ((caps[metre] if metre < count else last) - v) / _LOOK_AHEAD
+            if free > highest:
+                free = highest
+            elif free < lowest:
+                free = lowest
+            wanted, because = free, ""
+            for stop in stops:
+                allowed = self._for_stop(stop, s, v, k * STEP)
+                if allowed < wanted:
+                    wanted, because = allowed, stop.label
+            if leader is not None:
+                allowed = self._for_leader(leader.rears[k] - s, v, leader.speeds[k])
+                if allowed < wanted:
+                    wanted, because = allowed, leader.label
+            if k < _EXPLAINED and not label and wanted < free - _NOTICEABLE:
+                label = because
+            if is_steady and wanted <= 0.0 and v == a == 0.0:  # it stands for the rest
+                arcs += [s] * (STEPS - k)
+                speeds += [0.0] * (STEPS - k)
+                accelerations += [0.0] * (STEPS - k)
+                break
+            s, v, a = self._moved(s, v, a, wanted)
+            arcs.append(s)
+            speeds.append(v)
+            accelerations.append(a)
+        motion = np.array((arcs, speeds, accelerations))
+        return Profile(motion[0], motion[1], motion[2], label)
 
-
-def _for_leader(gap: float, v: float, leader_speed: float, config: PlanningConfig) -> float:
-    """The intelligent driver model; harsher than comfort only where the gap would not last otherwise, or there is none.
-
-    There is none to who comes into the ego's way beside its front: faster or not, an ego that is slow lets it.
-    """
-    if gap > _FAR:
-        return config.acceleration
-    if leader_speed < -_HOLD_SPEED:  # it comes towards the ego: what counts is the room there will be
-        gap += _ONCOMING * leader_speed
-    closing = v - leader_speed
-    if v < _HOLD_SPEED and leader_speed < _HOLD_SPEED and gap < config.follow_gap + _HOLD_GAP:
-        return _HOLD
-    if gap < 0.0 and v < _SLOW:
-        return -config.hard_braking
-    wanted = v * config.headway + 0.5 * v * closing / math.sqrt(config.acceleration * config.braking)
-    ratio = (config.follow_gap + wanted if wanted > 0.0 else config.follow_gap) / max(gap, _TOUCH)
-    allowed = config.acceleration * (1.0 - ratio * ratio)
-    if allowed >= -config.comfort_braking:
+    def _for_stop(self, stop: Stop, s: float, v: float, time: float) -> float:
+        """Stopping there or, where the ego need not stop to arrive no earlier than the way becomes free, that."""
+        distance = stop.at - s
+        if stop.until < math.inf:
+            left = stop.until - time
+            if left <= 0.0:
+                return self._highest
+            if 2.0 * distance > v * left:
+                return 2.0 * (distance - v * left) / (left * left)
+        if v < _HOLD_SPEED and distance < _HOLD_GAP:
+            allowed = _HOLD
+        elif distance > _TOUCH:
+            needed = v * v / (2.0 * distance)
+            allowed = max(self._highest - needed * needed / self._config.braking, -_FIRMER * needed)
+        else:
+            allowed = -self._config.hard_braking
+        if allowed < self._lowest:
+            firmest = _FIRMER * v * v / (2.0 * max(distance + stop.give, _TOUCH))
+            allowed = max(allowed, -max(self._config.comfort_braking, firmest))
         return allowed
-    needed = closing * closing / (2.0 * max(gap - _SAFE_GAP, _TOUCH)) if closing > 0.0 else 0.0
-    return max(allowed, -config.comfort_braking if needed < _GENTLE_CLOSING else -_HARDER * needed)
 
+    def _for_leader(self, gap: float, v: float, leader_speed: float) -> float:
+        """The intelligent driver model; beyond comfort only where the gap would not last otherwise, or there is none.
 
-def _moved(s: float, v: float, a: float, wanted: float, config: PlanningConfig) -> tuple[float, float, float]:
-    """One step on, with the acceleration moving linearly towards `wanted` within the limits of jerk."""
-    if wanted >= -config.comfort_braking and a >= -config.comfort_braking:
-        change = config.jerk * STEP
-    else:
-        change, wanted = config.hard_jerk * STEP, max(wanted, -config.hard_braking)
-    if wanted > a + change:
-        after = a + change
-    elif wanted < a - change:
-        after = a - change
-    else:
-        after = wanted
-    if v <= 0.0 and after <= 0.0:
-        return s, 0.0, 0.0
-    reached = v + 0.5 * STEP * (a + after)
-    if reached <= 0.0:
-        return s + min(v * v / -(a + after), v * STEP), 0.0, 0.0
-    way = STEP * (v + STEP * (2.0 * a + after) / 6.0)
-    return (s + way if way > 0.0 else s), reached, after
+        There is none to who comes into the ego's way beside its front: faster or not, an ego that is slow lets it.
+        """
+        config = self._config
+        if gap > _FAR:
+            return self._highest
+        if leader_speed < -_HOLD_SPEED:  # it comes towards the ego: what counts is the room there will be
+            gap += _ONCOMING * leader_speed
+        closing = v - leader_speed
+        if v < _HOLD_SPEED and leader_speed < _HOLD_SPEED and gap < config.follow_gap + _HOLD_GAP:
+            return _HOLD
+        if gap < 0.0 and v < _SLOW:
+            return -config.hard_braking
+        wanted = v * config.headway + 0.5 * v * closing / self._approach
+        ratio = (config.follow_gap + wanted if wanted > 0.0 else config.follow_gap) / max(gap, _TOUCH)
+        allowed = self._highest * (1.0 - ratio * ratio)
+        if allowed >= self._lowest:
+            return allowed
+        needed = closing * closing / (2.0 * max(gap - _SAFE_GAP, _TOUCH)) if closing > 0.0 else 0.0
+        return max(allowed, self._lowest if needed < _GENTLE_CLOSING else -_HARDER * needed)
+
+    def _moved(self, s: float, v: float, a: float, wanted: float) -> tuple[float, float, float]:
+        """One step on, with the acceleration moving linearly towards `wanted` within the limits of jerk."""
+        if wanted >= self._lowest and a >= self._lowest:
+            change = self._change
+        else:
+            change, wanted = self._hard_change, max(wanted, -self._config.hard_braking)
+        if wanted > a + change:
+            after = a + change
+        elif wanted < a - change:
+            after = a - change
+        else:
+            after = wanted
+        if v <= 0.0 and after <= 0.0:
+            return s, 0.0, 0.0
+        reached = v + 0.5 * STEP * (a + after)
+        if reached <= 0.0:
+            return s + min(v * v / -(a + after), v * STEP), 0.0, 0.0
+        way = STEP * (v + STEP * (2.0 * a + after) / 6.0)
+        return (s + way if way > 0.0 else s), reached, after
