@@ -253,17 +253,14 @@ def _leads(row: int, graph: Graph, lanes: frozenset[str], shape: VehicleShape, c
     None of who drives behind it, and does neither.
     """
     scene, futures, first = graph.scene, graph.scene.futures, graph.first[row]
-    is_there = scene.times[first] <= PRESENT
     is_beside = graph.low[row, 0] < shape.front and (scene.is_person[row] or futures.directions[row, 0] < -ALONG)
     if is_beside or abs(futures.directions[row, first]) < ALONG:
         return False
+    if futures.stations[row, 0] > shape.centre:
+        return bool(scene.times[first] <= PRESENT) and not _leaves_oncoming(row, graph, shape)
     aslant = futures.half_widths[row, : first + 1] - 0.5 * scene.boxes[scene.owners[row], 4]  # wider than it is
     is_along = futures.directions[row, 0] > ALONG
     is_in_lane = is_along and (graph.gaps[row, : first + 1] + aslant).max() < config.object_margin
-    if not (is_there or is_in_lane):
-        return False
-    if futures.stations[row, 0] > shape.centre:
-        return bool(is_there) and not _leaves_oncoming(row, graph, shape)
     is_crossing = not is_in_lane or (not lanes.issuperset(scene.lanes[row]) and graph.is_off_lane(row, shape.width))
     return False if is_crossing else None
 
