@@ -28,12 +28,13 @@ def waits(
     junctions, and with people on foot, the rules of meeting hold. An ego that would stand on a junction for it, in the
     way of others, waits before that; where it is too late for that, and the stretch is short, those rules hold, too.
     """
-    window, scene = graph.window.up_to_fold(), graph.scene
-    left, right = _beyond_lane(graph, window, views)
+    left, right = _beyond_lane(graph, graph.window, views)
     if left.max() <= 0.0 and right.max() <= 0.0:
         return []
+    window, scene = graph.window.up_to_fold(), graph.scene
     futures, begun = scene.futures, slice(0, int(shape.front) + 1)
     if window is not graph.window:
+        left, right = _beyond_lane(graph, window, views)
         futures = extents(window, scene.boxes, scene.poses, scene.owners[: scene.moving])
     directions = futures.directions[: scene.moving]
     comes: Flags = (directions[:, 0] < -ALONG) | (directions[:, -1] < -ALONG)
