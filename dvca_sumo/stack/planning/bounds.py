@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dvca_sumo.messages import VehicleShape
+from dvca_sumo.messages import Integers, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.st_graph import Graph
 
@@ -19,7 +19,8 @@ def blocking(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> int |
     stands_ahead = scene.is_standing & (lows > shape.front)
     if not np.count_nonzero(stands_ahead):
         return None
-    highs, rows = now.stations + now.half_lengths, window.index(now.stations)
+    rows: Integers = scene.rows_now[0]
+    highs = now.stations + now.half_lengths
     is_left = now.offsets > 0.5 * (path.left[rows] + path.right[rows])
     inner = now.offsets + np.where(is_left, -1.0, 1.0) * (now.half_widths + buffer)
     narrows = stands_ahead & np.where(is_left, inner < window.road_left[rows], inner > window.road_right[rows])
