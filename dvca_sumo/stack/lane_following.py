@@ -52,28 +52,15 @@ class Candidates(NamedTuple):
 
 
 class Movers(NamedTuple):
-    """Moving objects to be found on lanes."""
+    """Objects, some of which move and are to be found on lanes."""
 
-    rows: Integers  # (n,) object rows, ascending
+    rows: list[int]  # of those, ascending
     tracks: list[int]  # (n,)
-    traffic: list[Traffic]  # (n,)
+    classes: list[int]  # (n,) ObjectClass
     boxes: Floats  # (n, 5)
     headings: Floats  # (n,) [rad] directions of motion
     moved: Floats  # (n,) [m] since they were last seen
     reaches: Floats  # (n,) [m] how far they may get
-
-    def again(self, chosen: list[int]) -> "Movers":
-        """Only those at positions `chosen`, not moved since."""
-        tracks = [self.tracks[i] for i in chosen]
-        return Movers(
-            self.rows[chosen],
-            tracks,
-            [self.traffic[i] for i in chosen],
-            self.boxes[chosen],
-            self.headings[chosen],
-            np.zeros(len(chosen)),
-            self.reaches[chosen],
-        )
 
 
 class _Anchor:
@@ -131,24 +118,23 @@ class LaneFollowing:
         found, lost = self._followed(movers)
         if not lost:
             return found
-        for i in lost:
-            self._anchors[movers.tracks[i]] = _Anchor()
-        again = movers.again(lost)
-        self.find(range(len(lost)), again.tracks, again.boxes[:, :2], again.headings)
-        more, _ = self._followed(again)
+        for row in lost:
+            self._anchors[movers.tracks[row]] = _Anchor()
+        self.find(lost, movers.tracks, movers.boxes[:, :2], movers.headings)
+        more, _ = self._followed(movers._replace(rows=lost, moved=np.zeros(len(movers.moved))))
         return joined(found, more)
 
     def _followed(self, movers: Movers) -> tuple[Candidates, list[int]]:
-        """The candidates of movers that fit their lanes, and the positions of those that do not."""
+        """The candidates of movers that fit their lanes, and the rows of those that do not."""
         owners, paths, priors, guesses = [], [], [], []
-        moved, reaches = movers.moved.tolist(), movers.reaches.tolist()
-        each = zip(movers.tracks, movers.traffic, moved, reaches, strict=True)
-        for i, (track, traffic, step, reach) in enumerate(each):
-            anchor = self._anchors[track]
+        moved, reaches, lengths = movers.moved.tolist(), movers.reaches.tolist(), movers.boxes[:, 3].tolist()
+        for row in movers.rows:
+            anchor, step = self._anchors[movers.tracks[row]], moved[row]
             anchor.places = [(lane, station + step) for lane, station in anchor.places]
+            traffic = Traffic.of(movers.classes[row], lengths[row])
             for lane, station in anchor.places:
-                for path, probability in self._paths.branches(lane, station + reach, traffic):
-                    owners.append(i)
+                for path, probability in self._paths.branches(lane, station + reaches[row], traffic):
+                    owners.append(row)
                     paths.append(path)
                     priors.append(probability)
                     guesses.append(station)
@@ -167,7 +153,7 @@ class LaneFollowing:
         shared = self._shared(candidates, misfit, len(movers.tracks))
         lost = sorted(set(owners).difference(shared.owners.tolist()))
         self._advance(shared, movers.tracks)
-        return shared._replace(owners=movers.rows[shared.owners]), lost
+        return shared, lost
 
     def _shared(self, candidates: Candidates, misfit: Floats, count: int) -> Candidates:
         """Priors times Gaussian likelihood, as probabilities; what does not fit or is unlikely is dropped."""

@@ -12,7 +12,6 @@ import numpy as np
 from dvca_sumo.geometry.angles import wrapped_all
 from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, ObjectClass, PredictedObjects, TrackedObjects
 from dvca_sumo.roadmap import RoadMap
-from dvca_sumo.stack.continuations import Traffic
 from dvca_sumo.stack.hypotheses import Hypotheses, message_of
 from dvca_sumo.stack.lane_changes import LaneChangeConfig, LaneChanges, lateral_speeds
 from dvca_sumo.stack.lane_following import Candidates, LaneFollowing, LaneMatchConfig, Movers
@@ -105,18 +104,17 @@ class MapPrediction:
         is_fast = speeds > self._config.direction_speed
         headings = np.where(is_fast, np.arctan2(velocities[:, 1], velocities[:, 0]), tracked.boxes[:, 2])
         self._following.forget_all_but(tracks)
-        wheeled = (tracked.classes <= _LAST_ON_WHEELS).nonzero()[0]
-        self._following.find(wheeled.tolist(), tracks, tracked.boxes[:, :2], headings)
-        moving = wheeled[speeds[wheeled] >= self._config.standing_speed]
+        is_wheeled = tracked.classes <= _LAST_ON_WHEELS
+        self._following.find(is_wheeled.nonzero()[0].tolist(), tracks, tracked.boxes[:, :2], headings)
         return self._following.follow(
             Movers(
-                rows=moving,
-                tracks=[tracks[row] for row in moving.tolist()],
-                traffic=[*map(Traffic.of, tracked.classes[moving].tolist(), tracked.boxes[moving, 3].tolist())],
-                boxes=tracked.boxes[moving],
-                headings=headings[moving],
-                moved=speeds[moving] * elapsed,
-                reaches=reaches[moving],
+                rows=(is_wheeled & (speeds >= self._config.standing_speed)).nonzero()[0].tolist(),
+                tracks=tracks,
+                classes=tracked.classes.tolist(),
+                boxes=tracked.boxes,
+                headings=headings,
+                moved=speeds * elapsed,
+                reaches=reaches,
             )
         )
 
