@@ -64,20 +64,23 @@ def _met(rows: Integers, graph: Graph, speed: float, shape: VehicleShape, config
     return met
 
 
-def is_blocked(
-    view: LineView, distance: float, those: Ahead, speed: float, shape: VehicleShape, config: PlanningConfig
-) -> bool:
-    """Whether the ego, at `speed` [m/s], is to wait at a place it has not passed for the junction behind it to clear.
+def may_wait_at(view: LineView, distance: float, speed: float) -> bool:
+    """Whether an ego at `speed` [m/s] may be to wait for a junction to clear, `distance` [m] ahead of its front bumper.
+
+    Not where nobody crosses, nor at a place that it has passed, or could hardly stop at.
+    """
+    return bool(view.line.crosses) and distance > 0.0 and speed * speed <= 2.0 * _BRAKING * distance
+
+
+def is_blocked(view: LineView, distance: float, those: Ahead, shape: VehicleShape, config: PlanningConfig) -> bool:
+    """Whether the ego is to wait at a place where it may for the junction behind it to clear.
 
     That place, `distance` [m] ahead of the front bumper, is the line, or where one lets others pass on the junction.
 
     It is when one of `those` is on the junction across its way: people, or a vehicle that stands, waiting for others or
     for the ego itself. A vehicle there that heads its way, or moves, goes on. And it is when the ego would not fit
-    between the junction and the first one who stands beyond it, after all who drive there before it have closed up. It
-    is not any more where it could hardly stop.
+    between the junction and the first one who stands beyond it, after all who drive there before it have closed up.
     """
-    if not view.line.crosses or distance <= 0.0 or speed * speed > 2.0 * _BRAKING * distance:
-        return False
     leave = view.exit_distance
     inside = (those.rears > distance) & (those.rears <= leave)
     if (those.is_across & inside).any():

@@ -9,7 +9,7 @@ from dvca_sumo.geometry.boxes import corners
 from dvca_sumo.messages import Flags, Integers, VehicleShape
 from dvca_sumo.stack.planning.bounds import blocking
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.exits import Ahead, ahead, is_blocked
+from dvca_sumo.stack.planning.exits import ahead, is_blocked, may_wait_at
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.speed import Stop
 from dvca_sumo.stack.planning.st_graph import Graph
@@ -41,23 +41,31 @@ def nearest_stop(
         usual = float(graph.low[obstacle, 0]) - shape.front - gap
         closer = _closing_up(usual, views, shape, config)
         stops.append(Stop(usual + closer, config.object_gap - closer - _GIVE_AT_OBJECT, label))
-    if views and np.count_nonzero(graph.occupied):
+    places = [place for view in views for place in _before_junction(view, speed, config)]
+    if places and _is_beyond(min(min(distance, view.exit_distance) for view, distance, _ in places), graph, shape):
         those = ahead(graph, speed, shape, config)
-        for view in views:
-            stops += _before_blocked(view, those, speed, shape, config)
+        stops += [stop for view, distance, stop in places if is_blocked(view, distance, those, shape, config)]
     return min(stops, key=lambda stop: stop.at)
 
 
-def _before_blocked(
-    view: LineView, those: Ahead, speed: float, shape: VehicleShape, config: PlanningConfig
-) -> Iterator[Stop]:
-    """At the line, and at the place on the junction where others are let pass, if there is one."""
-    if is_blocked(view, view.distance, those, speed, shape, config):
-        yield _at_line(view, _OCCUPIED)
+def _before_junction(view: LineView, speed: float, config: PlanningConfig) -> Iterator[tuple[LineView, float, Stop]]:
+    """Where an ego at `speed` [m/s] may wait for it to clear, as a distance from the front bumper [m] and as a stop.
+
+    That is at the line, and at the place on the junction where others are let pass, if there is one.
+    """
+    if may_wait_at(view, view.distance, speed):
+        yield view, view.distance, _at_line(view, _OCCUPIED)
     place = view.waiting_distance
-    is_inside = place > view.distance and view.may_wait
-    if is_inside and is_blocked(view, max(place, _HERE), those, speed, shape, config):
-        yield Stop(place, config.stop_line_gap, _OCCUPIED)
+    if place > view.distance and view.may_wait and may_wait_at(view, max(place, _HERE), speed):
+        yield view, max(place, _HERE), Stop(place, config.stop_line_gap, _OCCUPIED)
+
+
+def _is_beyond(distance: float, graph: Graph, shape: VehicleShape) -> bool:
+    """Whether anybody is on the path, or comes to it, farther than `distance` [m] ahead of the front bumper."""
+    return any(
+        graph.occupied.item(row, column) and graph.low.item(row, column) - shape.front > distance
+        for row, column in enumerate(graph.first)
+    )
 
 
 def _closing_up(usual: float, views: list[LineView], shape: VehicleShape, config: PlanningConfig) -> float:
