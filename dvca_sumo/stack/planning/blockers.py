@@ -93,7 +93,9 @@ def blockers(
         is_held = np.array([track in held for track in scene.ids], dtype=np.bool_)
         limits = wanted + config.nudge_hold * is_held
         passed |= is_held & _is_too_near(speeds, speed, scene, shape, config)
-    near = passed & _may_be_passed_closer(limits, scene, window, shape)
+    near = passed & _is_on_way(scene, window, shape)
+    if np.count_nonzero(near):
+        near &= _may_be_passed_closer(limits, scene, window, shape)
     if not np.count_nonzero(near):
         return [], _NOBODY
     beside = _beside(scene, window, near | scene.is_standing)
@@ -132,8 +134,16 @@ def _is_too_near(speeds: Floats, speed: float, scene: Scene, shape: VehicleShape
     return near
 
 
+def _is_on_way(scene: Scene, window: Window, shape: VehicleShape) -> Flags:
+    """Which objects (n,) are on the way ahead, or beside it."""
+    now = scene.now
+    is_near: Flags = now.stations + now.half_lengths > -shape.rear_overhang - LENGTHWISE
+    is_near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
+    return is_near
+
+
 def _may_be_passed_closer(limits: Floats, scene: Scene, window: Window, shape: VehicleShape) -> Flags:
-    """Which objects (n,) on the way ahead, going by their extents, may be closer than `limits` (n,) [m]."""
+    """Which objects (n,), going by their extents, may be closer to the body than `limits` (n,) [m]."""
     now, rows = scene.now, scene.rows_now
     swept_left = np.maximum.reduce(window.swept_left.take(rows))
     swept_right = np.minimum.reduce(window.swept_right.take(rows))
@@ -141,8 +151,6 @@ def _may_be_passed_closer(limits: Floats, scene: Scene, window: Window, shape: V
     bend = 0.5 * float(np.maximum.reduce(np.abs(window.curvatures)))
     doubt = bend * (now.half_lengths * now.half_lengths + shape.length * shape.length) + _LEAST_DOUBT
     near: Flags = now.gaps(swept_left, swept_right) < limits + np.minimum(doubt, _DOUBT)
-    near &= now.stations + now.half_lengths > -shape.rear_overhang - LENGTHWISE
-    near &= now.stations - now.half_lengths < window.rows.shape[1] - BEHIND - _SEEN_LATE
     return near
 
 
