@@ -92,11 +92,11 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         The same as `Polyline.project` within a centimetre, for hundreds of points at a fraction of the
         cost. Offsets of points beyond an end hold the distance to that end.
         """
-        nodes = self.rows[:2, ::_NODES]
+        nodes = self.rows[:2, ::_NODES].copy()
         x, y = nodes
-        squares = points @ (-2.0 * nodes)
-        squares += x * x + y * y  # of the distances, less the points' own
-        nearest = squares.argmin(axis=1) * _NODES
+        nearness = points @ nodes
+        nearness -= 0.5 * (x * x + y * y)  # minus half the squares of the distances, but for the points' own
+        nearest = nearness.argmax(axis=1) * _NODES
         ahead, across, curvatures, _ = self._seen(points, nearest)
         rough = ahead / np.maximum(1.0 - curvatures * across, _NEAREST_CENTRE)
         rows = np.minimum(np.maximum(rough, -_NODES, out=rough), _NODES, out=rough)
