@@ -281,10 +281,11 @@ def leader_of(rows: list[int], graph: Graph, shape: VehicleShape) -> Leader | No
     if not rows:
         return None
     scene, those = graph.scene, np.array(rows)
-    low, first = graph.low[those], np.array([graph.first[row] for row in rows])
-    comes = (scene.futures.directions[those, 0] < 0.0) & (scene.times[first] <= PRESENT)
-    is_there = graph.occupied[those]
+    low, is_there = graph.low[those], graph.occupied[those]
+    comes = scene.futures.directions[those, 0] < 0.0
     if np.count_nonzero(comes):
+        first = np.array([graph.first[row] for row in rows])
+        comes &= scene.times[first] <= PRESENT
         is_there |= comes[:, None] & (first[:, None] > _COLUMNS)
     places, paces = np.where(is_there, low - shape.front, _NEVER), (low[:, 1:] - low[:, :-1]) / PREDICTION_STEP
     nearest = places.argmin(axis=0)
