@@ -160,14 +160,11 @@ def _extents(
     np.subtract(stations, half_lengths, out=ends[1])
     np.add(stations, half_lengths, out=ends[2])
     rows = window.index(ends)
-    now, rows_now = placed[:, :count], rows[:, :count]
-    futures = np.empty((5, moving + len(still), times))
-    futures[:, :moving] = placed[:, count:].reshape(5, moving, times)
-    futures[:, moving:] = now.take(still, axis=1)[:, :, None]
-    rows_then = np.empty((3, moving + len(still), times), dtype=np.int64)
-    rows_then[:, :moving] = rows[:, count:].reshape(3, moving, times)
-    rows_then[:, moving:] = rows_now.take(still, axis=1)[:, :, None]
-    return Extents(*now), Extents(*futures), rows_now, rows_then
+    columns = np.empty((moving + len(still), times), dtype=np.int64)
+    columns[:moving] = np.arange(count, len(flat)).reshape(moving, times)
+    columns[moving:] = still[:, None]
+    futures = Extents(*placed.take(columns, axis=1))
+    return Extents(*placed[:, :count]), futures, rows[:, :count], rows.take(columns, axis=1)
 
 
 def _placed(window: Window, poses: Floats, halves: Floats) -> Floats:
