@@ -96,6 +96,6 @@ class LaneChanges:
 
 def lateral_speeds(candidates: Candidates, velocities: Floats) -> Floats:
     """Speeds to the left of the path (h,) of objects with `velocities` (n, 2) [m/s]."""
-    owned, headings = velocities[candidates.owners], candidates.placements.headings
+    owned, headings = velocities.take(candidates.owners, axis=0), candidates.placements.headings
     leftward: Floats = owned[:, 1] * np.cos(headings) - owned[:, 0] * np.sin(headings)
     return leftward

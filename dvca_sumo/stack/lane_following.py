@@ -140,7 +140,7 @@ class LaneFollowing:
                     guesses.append(station)
         objects = np.array(owners, dtype=np.int64)
         stretches = stretches_of(paths)
-        places = self._paths.place(stretches, np.array(guesses), movers.boxes[objects])
+        places = self._paths.place(stretches, np.array(guesses), movers.boxes.take(objects, axis=0))
         config = self._config
         errors = wrapped_all(movers.headings[objects] - places.headings)
         fits = (

@@ -131,7 +131,7 @@ class MapPrediction:
         if not len(owners):
             return Hypotheses(owners, probabilities, np.empty((0, len(PREDICTION_TIMES), 3)), [])
         boxes = tracked.boxes.take(owners, axis=0)
-        own = self._nose_speeds(tracked.velocities[owners], boxes[:, 2], places.steering)
+        own = self._nose_speeds(tracked.velocities.take(owners, axis=0), boxes[:, 2], places.steering)
         own_trends = np.where(np.abs(places.steering) <= self._config.straight, trends[owners], 0.0)
         stations = self._motion.travelled(along, places.stations, own, own_trends, float(reaches[owners].max()))
         is_bicycle = tracked.classes[owners] == _BICYCLE

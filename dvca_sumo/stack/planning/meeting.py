@@ -170,7 +170,7 @@ class Meetings:
         if not np.count_nonzero(passes):
             return passes
         speeds = scene.speeds[scene.owners[rows]]
-        stations, offsets = scene.futures.stations[rows], scene.futures.offsets[rows]
+        stations, offsets = (part.take(rows, axis=0) for part in (scene.futures.stations, scene.futures.offsets))
         ways = np.hypot(stations[:, 1:] - stations[:, :-1], offsets[:, 1:] - offsets[:, :-1]).cumsum(axis=1)
         times = np.empty((len(rows), len(scene.times)))
         times[:] = scene.times
@@ -181,15 +181,13 @@ class Meetings:
     def _is_gone(self, times: Floats, rows: Integers | list[int], graph: Graph, profile: Profile) -> Flags:
         """Whether at `times` [s] the ego has left the places that the futures `rows` occupy one after the other."""
         rear = np.interp(times, STEP_TIMES, profile.arcs) - self._shape.rear_overhang
-        gone: Flags = np.logical_and.reduce((rear > graph.ends[rows]) | ~graph.occupied[rows], axis=1)
-        return gone
+        return _whenever_there(rows, rear > graph.ends.take(rows, axis=0), graph)
 
     def _comes_after(self, rows: Integers, graph: Graph, profile: Profile) -> Flags:
         """Whether the ego comes to every place that a future occupies after that has gone."""
         times = graph.scene.times + self._config.clear_margin
         front = np.interp(times, STEP_TIMES, profile.arcs) + (self._shape.front + _CLEAR_GAP)
-        after: Flags = np.logical_and.reduce((front < graph.begins[rows]) | ~graph.occupied[rows], axis=1)
-        return after
+        return _whenever_there(rows, front < graph.begins.take(rows, axis=0), graph)
 
     def _others_first(self, row: int, graph: Graph, views: list[LineView]) -> bool | None:
         """Whether the other has priority. People have, but before a crossing where they have to wait.
@@ -251,3 +249,9 @@ class Meetings:
             if view.distance - 1.0 <= nearest - front <= view.exit_distance and view.may_wait:
                 at = min(at, view.waiting_distance)
         return Stop(at, nearest - HARD_GAP - front - at, f"yield {graph.track(row)}", until)
+
+
+def _whenever_there(rows: Integers | list[int], holds: Flags, graph: Graph) -> Flags:
+    """Whether something `holds` (k, t) at all times at which the futures `rows` (k,) occupy the path: (k,)."""
+    always: Flags = np.logical_and.reduce(holds | ~graph.occupied.take(rows, axis=0), axis=1)
+    return always

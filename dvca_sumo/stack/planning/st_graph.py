@@ -281,7 +281,7 @@ def leader_of(rows: list[int], graph: Graph, shape: VehicleShape) -> Leader | No
     if not rows:
         return None
     scene, those = graph.scene, np.array(rows)
-    low, is_there = graph.low[those], graph.occupied[those]
+    low, is_there = graph.low.take(those, axis=0), graph.occupied.take(those, axis=0)
     comes = scene.futures.directions[those, 0] < 0.0
     if np.count_nonzero(comes):
         first = np.array([graph.first[row] for row in rows])
