@@ -54,7 +54,8 @@ class Meetings:
             return []
         those = np.array(rows)
         settled = self._comes_after(those, graph, profile)
-        settled |= self._passes(those, graph, profile, self._config.pass_margin)
+        if np.count_nonzero(settled) < len(rows):
+            settled |= self._passes(those, graph, profile, self._config.pass_margin)
         found = (
             self._demand(row, graph, views, profile)
             for row, is_settled in zip(rows, settled.tolist(), strict=True)
