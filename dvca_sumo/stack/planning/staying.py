@@ -28,13 +28,14 @@ class Staying:
         ids, time = situation.scene.ids, situation.time
         stood, moved = self.since, self._moving
         self.since, self._moving = {}, {}
+        self._driven.intersection_update(ids)
         for track, is_standing in zip(ids, situation.scene.is_standing.tolist(), strict=True):
             if is_standing:
                 self.since[track] = stood.get(track, time)
-            else:
-                self._moving[track] = moved.get(track, time)
-        self._driven.intersection_update(ids)
-        self._driven.update(track for track, since in self._moving.items() if time - since > _DRIVING)
+                continue
+            since = self._moving[track] = moved.get(track, time)
+            if time - since > _DRIVING:
+                self._driven.add(track)
 
     def will_stay(self, blocker: Blocker, situation: Situation, *, is_passing: bool) -> bool:
         """Whether it has stood for so long, where it is, that it will not move by itself.
