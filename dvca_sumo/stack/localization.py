@@ -139,7 +139,7 @@ class LocalizationFilter:
         self._way_x = self._way_y = self._way_time = self._turning_time = 0.0
         self._covariance = covariance
         residual = np.array([fix.x - self._x, fix.y - self._y, wrapped(fix.heading - self._heading)])
-        information = np.linalg.inv(covariance[:3, :3] + self._measurement_noise)
+        information = _inverse(covariance[:3, :3] + self._measurement_noise)
         if residual @ information @ residual > self._config.gate:
             self._refused += 1
             if self._refused >= self._config.lost_fixes:
@@ -173,3 +173,12 @@ class LocalizationFilter:
         )
         propagated: Floats = jacobian @ self._covariance @ jacobian.T + self._walks * self._way_time
         return propagated
+
+
+def _inverse(symmetric: Floats) -> Floats:
+    """Of a symmetric matrix (3, 3), by its cofactors."""
+    (a, b, c), (_, d, e), (_, _, f) = symmetric.tolist()
+    aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
+    bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
+    inverse: Floats = np.array([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]]) / (a * aa + b * ab + c * ac)
+    return inverse
