@@ -30,6 +30,9 @@ class LaneMotion:
     def __init__(self, config: MotionModelConfig, paths: LanePaths) -> None:
         self._config = config
         self._paths = paths
+        # By how much the squares of speeds in bends, and limits, are exceeded, at least and at most.
+        self._freedom = np.array([[1.0], [config.speeding**2]])
+        self._most_freedom = np.array([[config.brisk**2], [np.inf]])
 
     def reach(self, speeds: Floats, trends: Floats) -> Floats:
         """No object gets farther than this within the horizon [m]."""
@@ -44,28 +47,27 @@ class LaneMotion:
         distance over time follows by integrating ds / v, metre by metre.
         """
         config = self._config
-        count = int(farthest) + 2
-        bends, limits = self._paths.caps(paths, stations, count)
+        rows, count = len(stations), int(farthest) + 2
         metres = np.arange(count, dtype=np.float64)
-        squares = (speeds * speeds)[:, None]
-        final = np.maximum(speeds + trends * config.trend_duration, 0.0)
-        finals = (final * final)[:, None]
         # All in squares of speeds, so that one root is taken.
-        free = squares + (2.0 * trends)[:, None] * metres
-        free = np.minimum(np.maximum(free, np.minimum(squares, finals)), np.maximum(squares, finals))
+        squares = speeds * speeds
+        caps = self._paths.caps(paths, stations, count)
+        caps *= np.minimum(np.maximum(squares / caps[:, :, 0], self._freedom), self._most_freedom)[:, :, None]
+        # A trend has run its course after as many metres; one that ends in standing stands sooner.
+        course = 0.5 * config.trend_duration * (speeds + np.maximum(speeds + trends * config.trend_duration, 0.0))
+        squares = squares[:, None]
+        free = squares + (2.0 * trends)[:, None] * np.minimum(metres, course[:, None])
         slowing = squares - 2.0 * config.braking * metres
-        pace = np.maximum(config.speeding, speeds / limits[:, 0])[:, None]
-        briskness = np.minimum(np.maximum(speeds / bends[:, 0], 1.0), config.brisk)[:, None]
-        caps = np.minimum(briskness * bends, pace * limits)
-        profile = np.maximum(np.sqrt(np.minimum(free, np.maximum(caps * caps, slowing))), _CRAWL)
-        times = np.zeros(profile.shape)
-        (2.0 / (profile[:, 1:] + profile[:, :-1])).cumsum(axis=1, out=times[:, 1:])
-        # All rows in one interpolation: each is moved to a stretch of the time axis of its own.
-        apart = (2.0 * _LATE * np.arange(len(stations)))[:, None]
-        wanted = (PREDICTION_TIMES + apart).ravel()
-        known = (np.minimum(times, _LATE) + apart).ravel()
-        distances: Floats = np.interp(wanted, known, np.concatenate([metres] * len(stations)))
-        return stations[:, None] + distances.reshape(len(stations), -1)
+        capped = np.minimum(free, np.maximum(np.minimum(caps[0], caps[1]), slowing))
+        profile = np.sqrt(np.maximum(capped, _CRAWL * _CRAWL))
+        times = np.empty((rows, count))
+        times[:, 0] = _LATE
+        np.divide(2.0, profile[:, 1:] + profile[:, :-1], out=times[:, 1:])
+        # All rows in one interpolation: they follow each other on one time axis.
+        known, begins = times.cumsum(), np.arange(0, rows * count, count)
+        wanted = known[begins][:, None] + PREDICTION_TIMES
+        reached = np.interp(wanted, known, np.arange(rows * count, dtype=np.float64))
+        return reached + (stations - begins)[:, None]
 
     def settled(
         self, offsets: Floats, targets: Floats, lateral_speeds: Floats, speeds: Floats

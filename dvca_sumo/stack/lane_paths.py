@@ -20,7 +20,7 @@ from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.stack.continuations import Continuations, Traffic
 
 # Rows of the table, steps being those to the next column [m]; what is looked up together is adjacent.
-_STEP_X, _STEP_Y, _X, _Y, _HEADING, _HALF_WIDTH, _BEND_SPEED, _LIMIT, _ROWS = range(9)
+_STEP_X, _STEP_Y, _X, _Y, _HEADING, _HALF_WIDTH, _BEND_SQUARE, _LIMIT_SQUARE, _ROWS = range(9)
 
 _TAIL = 300  # [m] beyond a dead end or the net's edge, traffic is taken to go straight on
 _LENGTH_STEP = 40.0  # [m] continuations are kept by length in such steps
@@ -111,12 +111,12 @@ class LanePaths:
         offsets = (centre_y - y) * np.cos(headings) - (centre_x - x) * np.sin(headings)
         return Placements(stations, offsets, headings, wrapped_all(ahead - bearings), half_widths, beyond)
 
-    def caps(self, paths: Stretches, stations: Floats, count: int) -> tuple[Floats, Floats]:
-        """Speeds for bends, and speed limits, at `stations` (h,) and each of `count` metres on: (h, count) each."""
+    def caps(self, paths: Stretches, stations: Floats, count: int) -> Floats:
+        """Squares of speeds for bends, and of limits, from `stations` (h,) on, metre by metre: (2, h, count)."""
         first, last = paths
         metres = (np.maximum(np.rint(stations).astype(np.int64), 0) + first)[:, None] + np.arange(count)
-        bends, limits = self._table[_BEND_SPEED:].take(np.minimum(metres, last[:, None]), axis=1)
-        return bends, limits
+        squares: Floats = self._table[_BEND_SQUARE:].take(np.minimum(metres, last[:, None]), axis=1)
+        return squares
 
     def bodies(self, paths: Stretches, stations: Floats, lengths: Floats) -> Floats:
         """Poses of bodies so long (h,), noses on their paths, tails where these were a length before: (3, h, t).
@@ -165,23 +165,23 @@ class LanePaths:
                 *np.diff(poses[:, :2], axis=0, append=poses[-1:, :2]).T,
                 *poses.T,
                 np.array([part.width / 2.0 for part in parts])[which],
-                self._bend_speeds(poses[:, 2]),
-                np.array([part.speed_limit for part in parts])[which],
+                self._bend_squares(poses[:, 2]),
+                np.array([part.speed_limit**2 for part in parts])[which],
             ]
         )
         first = self._stored(columns)
         return LanePath(lanes, tuple(starts.tolist()), first, first + len(poses) - 1)
 
-    def _bend_speeds(self, headings: Floats) -> Floats:
-        """The speed at each column that leaves time to brake for the bends ahead [m/s]."""
+    def _bend_squares(self, headings: Floats) -> Floats:
+        """The square of the speed at each column that leaves time to brake for the bends ahead [m^2/s^2]."""
         if len(headings) <= 2 * _BEND:
             return np.full(len(headings), np.inf)
         turns = np.abs(headings[2 * _BEND :] - headings[: -2 * _BEND]) / (2.0 * _BEND)
         squares = self._lateral_acceleration / np.maximum(np.pad(turns, _BEND, mode="edge"), 1e-6)
         # v(s)^2 <= v(s')^2 + 2 b (s' - s) for every s' ahead: a running minimum from behind.
         braking = 2.0 * self._braking * np.arange(len(headings))
-        speeds: Floats = np.sqrt(np.minimum.accumulate((squares + braking)[::-1])[::-1] - braking)
-        return speeds
+        lowest: Floats = np.minimum.accumulate((squares + braking)[::-1])[::-1] - braking
+        return lowest
 
     def _stored(self, columns: Floats) -> int:
         first, self._used = self._used, self._used + columns.shape[1]
