@@ -107,8 +107,9 @@ class LanePaths:
         # Columns are 1 m apart: unless the window missed it, the nearest is about half a metre away along the path.
         beyond = np.maximum(np.abs(along) - 1.0, 0.0)
         stations = (nearest - first) + along - halves
-        x, y, headings = self.bodies(paths, stations[:, None], lengths)[:, :, 0]
-        offsets = (centre_y - y) * np.cos(headings) - (centre_x - x) * np.sin(headings)
+        poses, directions = self.bodies(paths, stations[:, None], lengths)
+        (x, y, headings), (cosines, sines) = poses[:, :, 0], directions[:, :, 0]
+        offsets = (centre_y - y) * cosines - (centre_x - x) * sines
         return Placements(stations, offsets, headings, wrapped_all(ahead - bearings), half_widths, beyond)
 
     def caps(self, paths: Stretches, stations: Floats, count: int) -> Floats:
@@ -118,10 +119,11 @@ class LanePaths:
         squares: Floats = self._table[_BEND_SQUARE:].take(np.minimum(metres, last[:, None]), axis=1)
         return squares
 
-    def bodies(self, paths: Stretches, stations: Floats, lengths: Floats) -> Floats:
+    def bodies(self, paths: Stretches, stations: Floats, lengths: Floats) -> tuple[Floats, Floats]:
         """Poses of bodies so long (h,), noses on their paths, tails where these were a length before: (3, h, t).
 
-        x, y and headings; `stations` (h, t) are half a length along the path behind the noses.
+        x, y and headings, and with them the headings' cosines and sines (2, h, t). `stations` (h, t) are half a length
+        along the path behind the noses.
         """
         first, last = paths
         half = 0.5 * lengths[:, None]
@@ -135,13 +137,13 @@ class LanePaths:
         points, steps = found[_X:], found[:_X]
         steps *= ends
         points += steps
-        ways = points[:, 0] - points[:, 1]
-        x, y = ways
+        directions = points[:, 0] - points[:, 1]
+        x, y = directions
         poses = np.empty((3, *stations.shape))
         np.arctan2(y, x, out=poses[2])
-        ways *= half / np.hypot(x, y)
-        np.subtract(points[:, 0], ways, out=poses[:2])
-        return poses
+        directions /= np.hypot(x, y)
+        np.subtract(points[:, 0], half * directions, out=poses[:2])
+        return poses, directions
 
     def _path(self, lanes: tuple[str, ...]) -> LanePath:
         found = self._paths.get(lanes)

@@ -136,9 +136,8 @@ class MapPrediction:
         stations = self._motion.travelled(along, places.stations, own, own_trends, float(reaches[owners].max()))
         is_bicycle = tracked.classes[owners] == _BICYCLE
         keeps_side = is_bicycle & (np.abs(places.offsets) <= places.half_widths)
-        poses = self._paths.bodies(along, stations, boxes[:, 3])
+        poses, (cosines, sines) = self._paths.bodies(along, stations, boxes[:, 3])
         x, y, headings = poses
-        cosines, sines = np.cos(headings), np.sin(headings)
         targets = np.where(keeps_side, places.offsets, 0.0)
         offsets, slants = self._motion.settled(places.offsets, targets, drifts, own)
         x -= offsets * sines
