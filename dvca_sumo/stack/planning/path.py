@@ -81,12 +81,12 @@ def path_along(
     y[: len(fade)] += (start.y - y[0]) * fade
     scale = 1.0 - line_curvatures * offsets
     tangents = slopes / scale
-    cosines_to_line = 1.0 / np.sqrt(1.0 + tangents * tangents)
+    ways = scale * np.sqrt(1.0 + tangents * tangents)  # along the path, per metre of the line
     angles, turns = np.arctan(tangents), np.zeros(count)
-    turns[0] = bend * cosines_to_line[0] * cosines_to_line[0] / scale[0]
+    turns[0] = bend * scale[0] / (ways[0] * ways[0])
     turns[1:-1] = 0.5 * (angles[2:] - angles[:-2])  # what they are at a row says little of moves as short as rows are
     np.add(line_headings, angles, out=headings)
-    np.divide((line_curvatures + turns) * cosines_to_line, scale, out=curvatures)
+    np.divide(line_curvatures + turns, ways, out=curvatures)
     arcs[0] = 0.0
     np.hypot(x[1:] - x[:-1], y[1:] - y[:-1]).cumsum(out=arcs[1:])
     sides = np.empty((2, BEHIND + count))

@@ -219,12 +219,13 @@ def _points(path: Path, profile: Profile) -> Floats:
     parts = ahead / steps
     first, last = before[4] * steps, after[4] * steps
     third = first + last - 2.0 * turned
-    second = turned - first - third
-    np.add(parts * (first + parts * (second + parts * third)), before[3], out=headings)
-    np.divide(first + parts * (2.0 * second + 3.0 * parts * third), steps, out=curvatures)
-    bulge = 0.5 * curvatures * parts * (1.0 - parts) * steps * steps  # of an arc over its chord
-    np.add(east / steps * ahead + before[1], bulge * np.sin(headings), out=x)
-    np.subtract(north / steps * ahead + before[2], bulge * np.cos(headings), out=y)
+    bent = parts * third
+    bend = turned - first - third + bent
+    np.add(parts * (first + parts * bend), before[3], out=headings)
+    np.divide(first + parts * (bend + bend + bent), steps, out=curvatures)
+    bulge = 0.5 * curvatures * ahead * (steps - ahead)  # of an arc over its chord
+    np.add(parts * east + before[1], bulge * np.sin(headings), out=x)
+    np.subtract(parts * north + before[2], bulge * np.cos(headings), out=y)
     return columns.T
 
 
