@@ -170,13 +170,13 @@ class Meetings:
         passes = self._is_gone(scene.times - margin, rows, graph, profile)
         if not np.count_nonzero(passes):
             return passes
-        speeds = scene.speeds[scene.owners[rows]]
+        at_rest, speeds = self._config.standing_speed, scene.speeds[scene.owners[rows], None]
         stations, offsets = (part.take(rows, axis=0) for part in (scene.futures.stations, scene.futures.offsets))
         ways = np.hypot(stations[:, 1:] - stations[:, :-1], offsets[:, 1:] - offsets[:, :-1]).cumsum(axis=1)
-        times = np.empty((len(rows), len(scene.times)))
-        times[:] = scene.times
-        keeps = speeds > self._config.standing_speed
-        times[keeps, 1:] = np.minimum(times[keeps, 1:], ways[keeps] / speeds[keeps, None])
+        arrivals = np.where(speeds > at_rest, ways / np.maximum(speeds, at_rest), np.inf)
+        times = np.empty(stations.shape)
+        times[:, 0] = scene.times[0]
+        np.minimum(scene.times[1:], arrivals, out=times[:, 1:])
         return passes & self._is_gone(times - max(margin - _SLOWS, 0.0), rows, graph, profile)
 
     def _is_gone(self, times: Floats, rows: Integers | list[int], graph: Graph, profile: Profile) -> Flags:
