@@ -99,7 +99,7 @@ class Tracker:
         tracks = self._tracks
         dx = tracks.means[:, 0, None] - found.boxes[:, 0]
         dy = tracks.means[:, 1, None] - found.boxes[:, 1]
-        own = 0.5 * (tracks.covariances[:, 0, 0] + tracks.covariances[:, 1, 1])
+        own = 0.5 * (tracks.estimates[:, 0, 0] + tracks.estimates[:, 1, 1])
         differs = tracks.classes[:, None] != found.classes
         costs: Floats = (dx * dx + dy * dy) / (own[:, None] + found.variances) + self._config.class_penalty * differs
         return costs

@@ -12,7 +12,8 @@ from dvca_sumo.messages import Flags, Floats, Integers, ObjectClass
 
 _CLASSES = len(ObjectClass)
 LAST_ON_WHEELS = int(ObjectClass.BICYCLE)  # vehicles and bicycles, by class number, move along their heading only
-_STATE = np.eye(4)  # x, y, vx, vy
+_MEAN = 4  # column of an estimate, after those of its covariance
+_ESTIMATE = np.eye(5)
 
 
 class MotionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -48,8 +49,7 @@ class Tracks:
         self._first_variances = np.array(config.first_speeds) ** 2
         self._next_id = 1
         self.ids: Integers = np.zeros(0, dtype=np.int64)
-        self.means: Floats = np.zeros((0, 4))  # x, y, vx, vy
-        self.covariances: Floats = np.zeros((0, 4, 4))
+        self.estimates: Floats = np.zeros((0, 4, 5))  # covariance of x, y, vx, vy, and as the last column their mean
         self.forms: Floats = np.zeros((0, 3))  # heading, length, width
         self.hits: Integers = np.zeros(0, dtype=np.int64)  # detections each track has had
         self.votes: Integers = np.zeros((0, _CLASSES), dtype=np.int64)  # hits by class
@@ -57,21 +57,26 @@ class Tracks:
         self.sweeps: Integers = np.zeros(0, dtype=np.int64)  # since the first hit, that included
         self.last_hits: Floats = np.zeros(0)  # [s]
 
+    @property
+    def means(self) -> Floats:
+        """(n, 4) x, y, vx, vy."""
+        return self.estimates[:, :, _MEAN]
+
     def predict(self, dt: float) -> None:
         """Move all tracks on by dt [s]."""
-        transition = _STATE.copy()
+        transition = _ESTIMATE.copy()
         transition[0, 2] = transition[1, 3] = dt
         a, b, c = dt**4 / 4.0, dt**3 / 2.0, dt**2
-        noise = np.array([[a, 0.0, b, 0.0], [0.0, a, 0.0, b], [b, 0.0, c, 0.0], [0.0, b, 0.0, c]])
+        noise = np.array([[a, 0.0, b, 0.0, 0.0], [0.0, a, 0.0, b, 0.0], [b, 0.0, c, 0.0, 0.0], [0.0, b, 0.0, c, 0.0]])
         variances = self._acceleration_variances[self.classes]
-        self.means = self.means @ transition.T
-        self.covariances = transition @ self.covariances @ transition.T + variances[:, None, None] * noise
+        moved = transition[:_MEAN, :_MEAN] @ self.estimates @ transition.T
+        self.estimates = moved + variances[:, None, None] * noise
         self.sweeps = self.sweeps + 1
 
     def update(self, rows: Integers, found: Measurements, time: float) -> None:
         """Correct track rows[k] by measurement k."""
-        means = self.means.take(rows, axis=0)
-        speeds = np.hypot(means[:, 2], means[:, 3])
+        known = self.estimates.take(rows, axis=0)
+        speeds = np.hypot(known[:, 2, _MEAN], known[:, 3, _MEAN])
         hits, votes = self.hits.copy(), self.votes.copy()
         hits[rows] += 1
         votes[rows, found.classes] += 1
@@ -79,41 +84,35 @@ class Tracks:
         last_hits[rows] = time
         self.hits, self.votes, self.classes, self.last_hits = hits, votes, votes.argmax(axis=1), last_hits
         self._update_forms(rows, found, speeds)
-        self._update_motion(rows, found, means, speeds)
+        self._update_motion(rows, found, known, speeds)
 
     def displace(self, rows: Integers, places: Floats) -> None:
         """Move tracks to `places` (k, 2) [m], their velocities as they were: a step aside is no speed."""
-        means = self.means.copy()
-        means[rows, :2] = places
-        self.means = means
+        estimates = self.estimates.copy()
+        estimates[rows, :2, _MEAN] = places
+        self.estimates = estimates
 
-    def _update_motion(self, rows: Integers, found: Measurements, means: Floats, speeds: Floats) -> None:
-        """Kalman update by position, radial speed and, for what rolls, no velocity across the heading."""
-        count = len(rows)
+    def _update_motion(self, rows: Integers, found: Measurements, known: Floats, speeds: Floats) -> None:
+        """Kalman update of estimates (k, 4, 5) by position, radial speed and, for what rolls, no velocity across it.
+
+        By one number after another: their noises are independent, and no matrix is inverted so.
+        """
+        for axis in range(2):
+            seen = known[:, axis].copy()
+            known = _corrected(known, seen, seen[:, axis] + found.variances, found.boxes[:, axis])
         headings = found.boxes[:, 2]
         rolls = self.classes[rows] <= LAST_ON_WHEELS
-        observation = np.zeros((count, 4, 4))
-        observation[:, 0, 0] = observation[:, 1, 1] = 1.0
-        observation[:, 2, 2:] = found.directions
-        observation[:, 3, 2] = -np.sin(headings) * rolls
-        observation[:, 3, 3] = np.cos(headings) * rolls
-        measured = np.zeros((count, 4))
-        measured[:, :2] = found.boxes[:, :2]
-        measured[:, 2] = found.radial_speeds
-        noise = np.empty((count, 4))
-        noise[:, 0] = noise[:, 1] = found.variances
-        noise[:, 2] = found.radial_variance
-        noise[:, 3] = (self._config.sideways_sigma + self._config.sideways_share * speeds) ** 2
-
-        covariances = self.covariances.take(rows, axis=0)
-        cross = observation @ covariances
-        spread = cross @ observation.transpose(0, 2, 1) + noise[:, :, None] * _STATE
-        gain = np.linalg.solve(spread, cross).transpose(0, 2, 1)
-        residual = measured - (observation @ means[:, :, None])[:, :, 0]
-        new_means, new_covariances = self.means.copy(), self.covariances.copy()
-        new_means[rows] = means + (gain @ residual[:, :, None])[:, :, 0]
-        new_covariances[rows] = covariances - gain @ cross
-        self.means, self.covariances = new_means, new_covariances
+        slips = (self._config.sideways_sigma + self._config.sideways_share * speeds) ** 2
+        east, north = found.directions.T
+        for x, y, variance, speed in (
+            (east, north, found.radial_variance, found.radial_speeds),
+            (-np.sin(headings) * rolls, np.cos(headings) * rolls, slips, 0.0),
+        ):
+            seen = x[:, None] * known[:, 2] + y[:, None] * known[:, 3]
+            known = _corrected(known, seen, x * seen[:, 2] + y * seen[:, 3] + variance, speed)
+        estimates = self.estimates.copy()
+        estimates[rows] = known
+        self.estimates = estimates
 
     def _update_forms(self, rows: Integers, found: Measurements, speeds: Floats) -> None:
         """Heading and size: the mean of all that was seen at first, then exponential smoothing."""
@@ -134,11 +133,9 @@ class Tracks:
     def add(self, found: Measurements, time: float) -> None:
         """Start a track of each measurement, under ids never used before."""
         count = len(found.classes)
-        means, covariances = self._first_motion(found)
         self.ids = np.concatenate([self.ids, np.arange(self._next_id, self._next_id + count)])
         self._next_id += count
-        self.means = np.concatenate([self.means, means])
-        self.covariances = np.concatenate([self.covariances, covariances])
+        self.estimates = np.concatenate([self.estimates, self._first_motion(found)])
         self.forms = np.concatenate([self.forms, found.boxes[:, 2:]])
         self.hits = np.concatenate([self.hits, np.ones(count, dtype=np.int64)])
         self.votes = np.concatenate([self.votes, np.eye(_CLASSES, dtype=np.int64)[found.classes]])
@@ -146,8 +143,8 @@ class Tracks:
         self.sweeps = np.concatenate([self.sweeps, np.ones(count, dtype=np.int64)])
         self.last_hits = np.concatenate([self.last_hits, np.full(count, time)])
 
-    def _first_motion(self, found: Measurements) -> tuple[Floats, Floats]:
-        """Means and covariances of new tracks: the radial speed conditions a velocity known only by class.
+    def _first_motion(self, found: Measurements) -> Floats:
+        """Estimates of new tracks: the radial speed conditions a velocity known only by class.
 
         The prior of what rolls lies along its heading, so its radial speed tells most of its velocity.
         """
@@ -158,20 +155,32 @@ class Tracks:
         prior = priors[:, None, None] * np.where(rolls, along[:, :, None] * along[:, None, :], np.eye(2)) + sideways
         cross = (prior @ found.directions[:, :, None])[:, :, 0]
         gain = cross / ((cross * found.directions).sum(axis=1) + found.radial_variance)[:, None]
-        means = np.concatenate([found.boxes[:, :2], gain * found.radial_speeds[:, None]], axis=1)
-        covariances = np.zeros((len(means), 4, 4))
-        covariances[:, 0, 0] = covariances[:, 1, 1] = found.variances
-        covariances[:, 2:, 2:] = prior - gain[:, :, None] * cross[:, None, :]
-        return means, covariances
+        estimates = np.zeros((len(gain), 4, 5))
+        estimates[:, 0, 0] = estimates[:, 1, 1] = found.variances
+        estimates[:, 2:, 2:_MEAN] = prior - gain[:, :, None] * cross[:, None, :]
+        estimates[:, :2, _MEAN] = found.boxes[:, :2]
+        estimates[:, 2:, _MEAN] = gain * found.radial_speeds[:, None]
+        return estimates
 
     def keep(self, flags: Flags) -> None:
         """Drop every track whose flag is not set."""
         self.ids = self.ids[flags]
-        self.means = self.means[flags]
-        self.covariances = self.covariances[flags]
+        self.estimates = self.estimates[flags]
         self.forms = self.forms[flags]
         self.hits = self.hits[flags]
         self.votes = self.votes[flags]
         self.classes = self.classes[flags]
         self.sweeps = self.sweeps[flags]
         self.last_hits = self.last_hits[flags]
+
+
+def _corrected(known: Floats, seen: Floats, spread: Floats, measured: Floats | float) -> Floats:
+    """Estimates (k, 4, 5) once a number is `measured` of each, of which they say `seen` (k, 5): h P, and h m.
+
+    `spread` (k,) is the variance of what is measured. Covariance and mean are less by P h' / spread times h P, and
+    times h m less what is measured.
+    """
+    gains = seen[:, :_MEAN, None] / spread[:, None, None]
+    seen[:, _MEAN] -= measured
+    corrected: Floats = known - gains * seen[:, None]
+    return corrected
