@@ -7,6 +7,9 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
+# As arrays: Python's own numbers take numpy longer to read than to add.
+_HALF_TURN, _TURN = np.array(math.pi), np.array(2.0 * math.pi)
+
 
 def wrapped(angle: float) -> float:
     """The same direction as `angle` [rad], in (-pi, pi]."""
@@ -15,4 +18,5 @@ def wrapped(angle: float) -> float:
 
 def wrapped_all(angles: Floats) -> Floats:
     """`wrapped`, element by element."""
-    return np.pi - (np.pi - angles) % (2.0 * np.pi)
+    within: Floats = _HALF_TURN - (_HALF_TURN - angles) % _TURN
+    return within
