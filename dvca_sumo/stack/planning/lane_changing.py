@@ -13,7 +13,7 @@ import numpy as np
 from dvca_sumo.messages import Flags, Floats, TrackedObjects, VehicleShape
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning.config import PlanningConfig
-from dvca_sumo.stack.planning.lane_gaps import LAST_SPEED, Gaps, Neighbours
+from dvca_sumo.stack.planning.lane_gaps import LAST_SPEED, Gaps, Neighbours, Urgency
 from dvca_sumo.stack.planning.moves import Lateral, Move, blend_length, moved
 from dvca_sumo.stack.planning.reference import BEHIND, Window
 from dvca_sumo.stack.planning.speed import Stop
@@ -79,16 +79,15 @@ class LaneChanger:
             return LaneChoice()
         stop = last_stop(change, window, last - self._lane, speed, self._shape, self._config)
         has_to = is_last_chance(stop, speed)
-        is_hurried = stop.at < self._config.change_hurry * speed
+        patience = Urgency.HURRIED if stop.at < self._config.change_hurry * speed else Urgency.WANTED
         occupied = self._gaps.occupied(change, window.station, objects)
         target = self._lane
         # A change begun in the other direction swings out far before it turns round.
         is_going_back = self._target == self._lane and abs(aside) > ARRIVED and speed > LAST_SPEED
         waits = is_going_back or is_at_junction(change, window, speed, self._shape, self._config)
         while target < last and (target < self._target or not waits):
-            is_pressed = has_to or target < self._target
-            lane = occupied[target + 1]
-            if not self._gaps.is_free(lane, change, window, speed, is_pressed=is_pressed, is_hurried=is_hurried):
+            urgency = Urgency.PRESSED if has_to or target < self._target else patience
+            if not self._gaps.is_free(occupied[target + 1], change, window, speed, urgency):
                 break
             target += 1
         width, beside = change.widths[self._lane], occupied[self._lane + 1]

@@ -4,6 +4,7 @@ They are told by what has to brake how hard (as in MOBIL: Kesting, Treiber, Helb
 model, 2007).
 """
 
+import enum
 import math
 from typing import NamedTuple
 
@@ -32,6 +33,15 @@ _PAST = 3.5  # times the distance to who is behind, the next lane is in view pas
 _NEAR = 30.0  # [m] of effort, beyond which another place is looked for
 _CATCHES_UP = 0.8  # of the ego's speed: slower ones are come up to ...
 _FORWARD = 3.0  # ... while a gap beside faster ones is that much harder to get to than one farther back
+
+
+class Urgency(enum.IntEnum):
+    """How much there is to a change of lanes now."""
+
+    CAN_WAIT = enum.auto()  # later does as well
+    WANTED = enum.auto()
+    HURRIED = enum.auto()  # the last place for it is near
+    PRESSED = enum.auto()  # it is under way, or the ego has all but stopped for it
 
 
 class Neighbours(msgspec.Struct, frozen=True, eq=False):
@@ -89,32 +99,24 @@ class Gaps:
             found.append(Neighbours(places - halves, places + halves, speeds[rows], is_traffic, tracks))
         return found
 
-    def is_free(
-        self,
-        lane: Neighbours,
-        change: LaneChange,
-        window: Window,
-        speed: float,
-        *,
-        is_pressed: bool,
-        is_hurried: bool = False,
-    ) -> bool:
+    def is_free(self, lane: Neighbours, change: LaneChange, window: Window, speed: float, urgency: Urgency) -> bool:
         """Whether nobody on the lane has to brake more than a little when the ego is there; hurried, at once.
 
         That is where the change can begin, those on the lane keeping their speeds until then; pressed, where
         the body gets over the marking. Thus it takes up what those who stop for it offer. But who passes before that
         hides others who follow close behind. Headways need not be there before the change is over: who is faster than
         who follows gets away until then; but who closes in does so at least until it brakes, and all the faster where
-        the ego is about to stop at its destination.
+        the ego is about to stop at its destination. Where the change can wait, who closes in goes first, but with a
+        headway as the ego itself keeps.
         """
         if not lane.tracks:
             return True
         config, shape = self._config, self._shape
-        headway, braking = 0.0 if is_hurried else config.change_headway, config.change_braking
+        headway, braking = 0.0 if urgency >= Urgency.HURRIED else config.change_headway, config.change_braking
         ahead = max(change.start_station - window.station - shape.front, 0.0)
         wait = ahead / max(speed, LAST_SPEED)
-        if is_pressed:
-            headway, braking = 0.0, config.comfort_braking
+        if urgency == Urgency.PRESSED:
+            braking = config.comfort_braking
             within = _WITHIN * blend_length(max(change.widths), LAST_SPEED, config)
             faster = math.sqrt(speed * speed + 2.0 * config.acceleration * within)
             ahead += within
@@ -124,15 +126,16 @@ class Gaps:
         nose, tail = ahead + shape.front, ahead - shape.rear_overhang
         is_ahead = 0.5 * (rears + fronts) > 0.5 * (nose + tail)
         gaps, speeds = np.where(is_ahead, rears - nose, tail - fronts), lane.speeds
-        if is_pressed and is_ahead.all() and lane.fronts[-1] < 0.0:
+        if urgency == Urgency.PRESSED and is_ahead.all() and lane.fronts[-1] < 0.0:
             gaps = np.append(gaps, tail - rears[-1] + _FOLLOWED * speeds[-1])
             is_ahead, speeds = np.append(is_ahead, False), np.append(speeds, speeds[-1])
         closing = np.where(is_ahead, speed - speeds, speeds - self._slowed(window, speed))
         opened = _CROSSING * np.maximum(-closing, 0.0)
+        left = np.where(closing > 0.0, config.headway, headway) if urgency == Urgency.CAN_WAIT else headway
         kept = np.where(
             is_ahead,
             headway * speed - opened,
-            np.maximum(headway * speeds - opened, config.expected_reaction * closing),
+            np.maximum(left * speeds - opened, config.expected_reaction * closing),
         )
         needed = config.change_gap + np.maximum(kept, 0.0) + _braked(closing, braking)
         return bool((gaps >= needed).all())

@@ -23,9 +23,10 @@ from dvca_sumo.stack.planning.lane_changing import (
     last_stop,
     letting_in,
 )
-from dvca_sumo.stack.planning.lane_gaps import Gaps, Neighbours
+from dvca_sumo.stack.planning.lane_gaps import Gaps, Neighbours, Urgency
 from dvca_sumo.stack.planning.limits import cruise_speeds
 from dvca_sumo.stack.planning.reference import BEHIND, Window
+from dvca_sumo.stack.planning.speed import Stop
 
 _BESIDE, _OWN = 0, 1  # lanes of the way back
 _LONGER = 2.0  # that the next lane is to be the faster one
@@ -81,7 +82,7 @@ class Passing:
         wish = target = self._wish(beside, own, is_late=is_late, is_queue=is_queue)
         if target != self._lane:
             is_under_way = self._lane != self._target
-            is_pressed = is_under_way or (stop is not None and is_last_chance(stop, speed))
+            urgency = self._urgency(target, stop, speed, is_late=is_late)
             is_begun = is_under_way and (
                 goes_on(float(aside[self._lane]), way.widths[self._lane], occupied[target], shape)
                 or is_caught(occupied[self._lane], occupied[target], speed, shape, config)
@@ -89,7 +90,7 @@ class Passing:
             is_pulling_out = target == _BESIDE != self._target
             may_begin = is_begun or (
                 (is_under_way or not is_at_junction(way, window, speed, shape, config))
-                and self._gaps.is_free(occupied[target], way, window, speed, is_pressed=is_pressed)
+                and self._gaps.is_free(occupied[target], way, window, speed, urgency)
                 and (not is_pulling_out or self._gaps.is_in_sight(occupied[_OWN], occupied[_BESIDE], wanted, speed))
             )
             if not may_begin:
@@ -113,6 +114,12 @@ class Passing:
             return _OWN if is_late or own >= beside else _BESIDE
         is_worth_it = beside > own + self._config.passing_gain
         return _BESIDE if is_worth_it and (self._lanes[self._next].leads_on or not is_queue) else _OWN
+
+    def _urgency(self, target: int, stop: Stop | None, speed: float, *, is_late: bool) -> Urgency:
+        """How much there is to a change to the lane `target` now."""
+        if self._lane != self._target or (stop is not None and is_last_chance(stop, speed)):
+            return Urgency.PRESSED
+        return Urgency.CAN_WAIT if target == _OWN and not is_late else Urgency.WANTED
 
     def _pace_on(
         self, lane: Neighbours, gains: dict[int, float], wanted: float, outlook: float, *, is_own: bool

@@ -13,7 +13,7 @@ from dvca_sumo.roadmap import Control, Route
 from dvca_sumo.roadmap.route import LaneChange
 from dvca_sumo.stack.planning import Planner, PlanningConfig
 from dvca_sumo.stack.planning.destination import stop_station
-from dvca_sumo.stack.planning.lane_gaps import Gaps, Neighbours
+from dvca_sumo.stack.planning.lane_gaps import Gaps, Neighbours, Urgency
 from dvca_sumo.stack.planning.reference import Reference
 
 WIDTH = 3.2  # [m] of a lane
@@ -242,7 +242,7 @@ def test_from_standstill_it_does_not_begin_while_somebody_passes_who_hides_those
     places, count = np.array(fronts), len(fronts)
     lane = Neighbours(places - 4.5, places, np.full(count, 20.0), np.ones(count, dtype=np.bool_), list(range(count)))
     gaps = beside(route, config)
-    assert gaps.is_free(lane, route.lane_changes[0], window, 0.0, is_pressed=True) is is_free
+    assert gaps.is_free(lane, route.lane_changes[0], window, 0.0, Urgency.PRESSED) is is_free
 
 
 @pytest.mark.parametrize(
@@ -261,7 +261,7 @@ def test_close_behind_who_gets_away_it_goes_to_the_next_lane(
     nose = np.array([SHAPE.front + 3.5])
     lane = Neighbours(nose, nose + 4.5, np.array([pace]), np.ones(1, dtype=np.bool_), [1])
     gaps = beside(route, config)
-    assert gaps.is_free(lane, route.lane_changes[0], window, 13.0, is_pressed=False) is is_free
+    assert gaps.is_free(lane, route.lane_changes[0], window, 13.0, Urgency.WANTED) is is_free
 
 
 @pytest.mark.parametrize(
@@ -285,7 +285,7 @@ def test_who_closes_in_from_behind_has_room_to_see_and_to_brake_also_when_the_eg
     lane = Neighbours(fronts - 4.5, fronts, speeds, np.ones(1, dtype=np.bool_), [1])
     gaps = beside(route, config)
     change = msgspec.structs.replace(route.lane_changes[0], latest_station=590.0)
-    assert gaps.is_free(lane, change, window, speed, is_pressed=False, is_hurried=True) is is_free
+    assert gaps.is_free(lane, change, window, speed, Urgency.HURRIED) is is_free
 
 
 @pytest.mark.parametrize("ahead", [-124.0, -121.0, -118.0, 118.0, 121.0, 124.0])

@@ -220,6 +220,22 @@ def test_before_who_stands_a_change_is_gone_on_with_but_not_into_who_is_beside_o
     assert is_caught(standing, other, 13.0, SHAPE, PlanningConfig()) == expected
 
 
+def test_who_comes_faster_from_behind_on_its_own_lane_goes_first_where_it_can_come_back_later_as_well() -> None:
+    slow = car(7, 80.0, speed=8.5)
+    alone = drive(beside(), 20.0, speed=13.0, actors=[slow])
+    times, offsets = alone.states[:, 0], alone.states[:, 2]
+    row = int(((times > 10.0) & (offsets < WIDTH - 0.3)).argmax())  # the ego has begun to come back
+    pace = float(alone.speeds[row]) + 2.0
+    begin = float(alone.fronts[row]) - SHAPE.length - 12.0 - pace * float(times[row])
+
+    driven = drive(beside(), 40.0, speed=13.0, actors=[slow, car(8, begin - 2.25, speed=pace)])
+    is_back = (driven.states[:, 0] > times[row] - 2.0) & (driven.states[:, 2] < WIDTH - 1.0)
+    assert is_back.any()
+    back = int(is_back.argmax())
+    assert begin + pace * driven.states[back, 0] > driven.fronts[back]
+    assert driven.clearances.min() > 1.0
+
+
 @pytest.mark.parametrize(("faster", "braking", "gap", "aside"), [(1.0, 0.0, 2.0, 0.6), (5.0, 2.0, 6.0, 0.5)])
 def test_on_its_way_back_from_a_change_given_up_it_does_not_begin_that_again_without_a_gap(
     faster: float, braking: float, gap: float, aside: float
