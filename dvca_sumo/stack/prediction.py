@@ -133,7 +133,8 @@ class MapPrediction:
         boxes = tracked.boxes.take(owners, axis=0)
         own = self._nose_speeds(tracked.velocities.take(owners, axis=0), boxes[:, 2], places.steering)
         own_trends = np.where(np.abs(places.steering) <= self._config.straight, trends[owners], 0.0)
-        stations = self._motion.travelled(along, places.stations, own, own_trends, float(reaches[owners].max()))
+        farthest = float(self._motion.reach(own, own_trends).max())
+        stations = self._motion.travelled(along, places.stations, own, own_trends, farthest)
         is_bicycle = tracked.classes[owners] == _BICYCLE
         keeps_side = is_bicycle & (np.abs(places.offsets) <= places.half_widths)
         poses, (cosines, sines) = self._paths.bodies(along, stations, boxes[:, 3])

@@ -101,6 +101,28 @@ def ends(result: PredictedObjects, lane: str) -> list[int]:
     return [h for h, lanes in enumerate(result.lanes) if lanes[-1:] == (lane,)]
 
 
+def way_right(roadmap: RoadMap) -> Polyline:
+    """From the lane at the right of the road round the corner."""
+    (way,) = (lanes for lanes in predicted(roadmap, Seen(-20.0, RIGHT, speed=6.0)).lanes if lanes[-1] == "right_0")
+    return Polyline(np.concatenate([roadmap.lanes[lane].line.points for lane in way]))
+
+
+def turning(line: Polyline, nose: float, length: float, speed: float) -> tuple[Floats, float]:
+    """Pose and speed of a body so long as SUMO turns it: `nose` is its station on the line, `speed` that of the nose.
+
+    Its tail is in line with where the nose was a length before.
+    """
+
+    def pose(nose: float) -> Floats:
+        front, rear = line.poses([nose, nose - length])[:, :2]
+        ahead = (front - rear) / math.dist(front, rear)
+        return np.array([*(front - 0.5 * length * ahead), math.atan2(ahead[1], ahead[0])])
+
+    x, y, heading = pose(nose)
+    east, north, _ = (pose(nose + 0.1) - pose(nose - 0.1)) / 0.2 * speed
+    return np.array([x, y, heading]), float(east * math.cos(heading) + north * math.sin(heading))
+
+
 def test_a_vehicle_in_a_bend_stays_on_its_lane(roadmap: RoadMap) -> None:
     x, y, heading = lane_point(roadmap, "bend_0", 200.0)
     result = predicted(roadmap, Seen(x, y, heading))
@@ -147,27 +169,29 @@ def test_both_ends_of_a_car_follow_a_sharp_turn_that_its_middle_cuts(roadmap: Ro
 
 @pytest.mark.parametrize("length", [4.5, 9.0, 12.0])
 def test_in_a_sharp_turn_a_vehicle_follows_its_nose_and_is_as_fast_as_that(roadmap: RoadMap, length: float) -> None:
-    """SUMO turns a vehicle so: its nose is on the lane, its tail in line with where the nose was a length before."""
-    (way,) = (lanes for lanes in predicted(roadmap, Seen(-20.0, RIGHT, speed=6.0)).lanes if lanes[-1] == "right_0")
-    line = Polyline(np.concatenate([roadmap.lanes[lane].line.points for lane in way]))
-
-    def body(nose: float) -> Floats:
-        front, rear = line.poses([nose, nose - length])[:, :2]
-        ahead = (front - rear) / math.dist(front, rear)
-        return np.array([*(front - 0.5 * length * ahead), math.atan2(ahead[1], ahead[0])])
-
+    line = way_right(roadmap)
     prediction = MapPrediction(PredictionConfig(), roadmap)
     speed, corner = 3.0, roadmap.lanes["in_0"].line.length
     for time in np.arange(0.0, (length + 9.0) / speed, 0.1).tolist():
         nose = corner + time * speed
-        x, y, heading = body(nose)
-        east, north, _ = (body(nose + 0.1) - body(nose - 0.1)) / 0.2 * speed
-        forward = east * math.cos(heading) + north * math.sin(heading)
+        (x, y, heading), forward = turning(line, nose, length, speed)
         result = prediction.step(tracked(time, Seen(x, y, heading, forward, length=length)))
         (right,) = ends(result, "right_0")
-        later = body(nose + PREDICTION_TIMES[2] * speed)
+        later, _ = turning(line, nose + PREDICTION_TIMES[2] * speed, length, speed)
         assert math.dist(result.poses[right, 2, :2], later[:2]) < 0.35
         assert result.poses[right, 2, 2] == pytest.approx(later[2], abs=0.1)
+
+
+def test_who_turns_sharply_gets_as_far_as_its_nose_which_is_much_faster_than_its_middle(roadmap: RoadMap) -> None:
+    line, length, speed = way_right(roadmap), 12.0, 7.0
+    prediction = MapPrediction(PredictionConfig(), roadmap)
+    corner = roadmap.lanes["in_0"].line.length
+    for time in np.arange(0.0, 2.0, 0.1).tolist():
+        (x, y, heading), forward = turning(line, corner + time * speed, length, speed)
+        result = prediction.step(tracked(time, Seen(x, y, heading, forward, length=length)))
+        (right,) = ends(result, "right_0")
+        ways = np.hypot(*np.diff(result.poses[right, -8:, :2], axis=0).T)
+        assert ways.min() > 0.9 * ways.max()
 
 
 def test_at_a_fork_every_way_is_a_hypothesis_and_straight_on_the_likeliest(roadmap: RoadMap) -> None:
