@@ -95,7 +95,7 @@ class Tracks:
     def _update_motion(self, rows: Integers, found: Measurements, known: Floats, speeds: Floats) -> None:
         """Kalman update of estimates (k, 4, 5) by position, radial speed and, for what rolls, no velocity across it.
 
-        By one number after another: their noises are independent, and no matrix is inverted so.
+        Sequential: the noises are independent, so that each number corrects by itself, and no matrix is inverted.
         """
         for axis in range(2):
             seen = known[:, axis].copy()
