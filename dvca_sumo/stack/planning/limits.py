@@ -11,7 +11,7 @@ from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.junctions import LineView
 from dvca_sumo.stack.planning.reference import BEHIND
 from dvca_sumo.stack.planning.scene import ALONG
-from dvca_sumo.stack.planning.speed import slowed_before
+from dvca_sumo.stack.planning.speed import HARD_GAP, slowed_before
 from dvca_sumo.stack.planning.st_graph import AT_CROSSING, Graph
 
 _PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
@@ -20,6 +20,7 @@ _SLOW_FOR_PERSON = (3.0, 6.0)  # [m/s], [m/s per m of gap]
 _SLOW_FOR_OBJECT = (4.0, 10.0)  # [m/s], [m/s per m of gap]
 _CREEPING = 1.0  # [m/s] past people who stand very close: below `creeping_speed`, so that they stay out of the way ...
 _ROOM_TO_CREEP = 6.0  # ... and from so far before them [m]: from where the ego stopped for them
+_STOPPABLE = 3.5  # [m/s^2] of braking that would do before who walks in the ego's way: they may stay there
 _STEERED = 4  # [m] of path over which changes of curvature are looked at
 _BESIDE = 3.0  # [m] sideways
 _AT_LINE = 4.0  # [m] before or past it
@@ -45,8 +46,8 @@ def speed_caps(
 ) -> list[float]:
     """Highest speed by metre of path [m/s]: limit, curves, how fast the wheels turn, and whom the ego comes close to.
 
-    On the stretches `blind` [m] the ego feels its way. Each is braked for in comfort beforehand. `speed` is the ego's
-    [m/s].
+    On the stretches `blind` [m] the ego feels its way. Each is braked for in comfort beforehand. Who walks in its way,
+    to be gone before it comes, may stop there: the ego still could, too. `speed` is the ego's [m/s].
     """
     path = graph.path
     caps = np.minimum(
@@ -63,8 +64,22 @@ def speed_caps(
         if end > 0.0:
             part = slice(max(int(begin), 0), int(end) + 1)
             caps[part] = np.minimum(caps[part], cap)
-    slowed: list[float] = slowed_before(caps, path.arcs, config.slowing).tolist()
-    return slowed
+    slowed = slowed_before(caps, path.arcs, config.slowing)
+    nearest = _person_in_way(graph, shape, config)
+    if nearest < math.inf:
+        slowed = np.minimum(slowed, np.sqrt(2.0 * _STOPPABLE * np.maximum(nearest - path.arcs, 0.0)))
+    bounds: list[float] = slowed.tolist()
+    return bounds
+
+
+def _person_in_way(graph: Graph, shape: VehicleShape, config: PlanningConfig) -> float:
+    """How far it is to the nearest one ahead who walks in the ego's way [m]; infinite where nobody does."""
+    moving = slice(graph.scene.moving)
+    people, low = graph.scene.is_person[moving], graph.low[moving, 0]
+    if not np.count_nonzero(people):
+        return math.inf
+    in_way = people & (graph.gaps[moving, 0] < config.person_margin) & (low > shape.front)
+    return float(low[in_way].min(initial=math.inf)) - shape.front - HARD_GAP
 
 
 def _slow_stretches(

@@ -179,6 +179,18 @@ def test_person_who_stays_in_the_lane_is_stopped_for() -> None:
     assert driven.clearances.min() > 2.0
 
 
+@pytest.mark.parametrize(
+    ("speed", "x", "y", "stays"), [(13.0, 70.0, -2.0, 2.5), (10.0, 70.0, -3.0, 3.0), (10.0, 80.0, -4.0, 4.0)]
+)
+def test_before_a_person_who_walks_off_its_way_the_ego_could_stop_should_they_stay_there(
+    speed: float, x: float, y: float, stays: float
+) -> None:
+    walker = person(3, x, y, heading=UP, speed=1.2, stays_from=stays)
+    driven = drive(road(), 12.0, station=20.0, speed=speed, actors=[walker])
+    assert driven.clearances.min() > 0.9
+    assert driven.states[:, 5].min() > -5.1
+
+
 def test_person_standing_off_the_road_is_just_passed() -> None:
     driven = drive(road(), 15.0, speed=13.0, actors=[person(3, 80.0, -3.5)])
     assert driven.speeds.min() > 12.5
