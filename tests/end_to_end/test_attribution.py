@@ -29,7 +29,7 @@ EXACT = (
     Case("cs3", "localization.lateral:left=2.5,start=10,end=13"),
     Case("cs2", "perception.longitudinal"),
     Case("cs4", "perception.miss:start=14,end=17"),
-    Case("cs1", "prediction.wrong:start=8.5,end=13"),
+    Case("cs1", "prediction.wrong:object=pedestrian,start=8.5,end=13"),
     Case("cs4", "prediction.wrong:start=14,end=17"),
     Case("cs1", "planning.speed:start=5,end=8"),
     Case("cs1", "planning.none:start=8"),
