@@ -13,7 +13,7 @@ from dvca_sumo.messages import Flags, Floats, Integers, ObjectClass
 _CLASSES = len(ObjectClass)
 LAST_ON_WHEELS = int(ObjectClass.BICYCLE)  # vehicles and bicycles, by class number, move along their heading only
 _MEAN = 4  # column of an estimate, after those of its covariance
-_ESTIMATE = np.eye(5)
+_AT_REST = np.eye(5)  # how an estimate moves on in no time
 
 
 class MotionConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -64,7 +64,7 @@ class Tracks:
 
     def predict(self, dt: float) -> None:
         """Move all tracks on by dt [s]."""
-        transition = _ESTIMATE.copy()
+        transition = _AT_REST.copy()
         transition[0, 2] = transition[1, 3] = dt
         a, b, c = dt**4 / 4.0, dt**3 / 2.0, dt**2
         noise = np.array([[a, 0.0, b, 0.0, 0.0], [0.0, a, 0.0, b, 0.0], [b, 0.0, c, 0.0, 0.0], [0.0, b, 0.0, c, 0.0]])
@@ -177,8 +177,8 @@ class Tracks:
 def _corrected(known: Floats, seen: Floats, spread: Floats, measured: Floats | float) -> Floats:
     """Estimates (k, 4, 5) once a number is `measured` of each, of which they say `seen` (k, 5): h P, and h m.
 
-    `spread` (k,) is the variance of what is measured. Covariance and mean are less by P h' / spread times h P, and
-    times h m less what is measured.
+    `spread` (k,) is the variance of what is measured; `seen` is used up. Covariance and mean are less by
+    P h' / spread times h P, and times h m less what is measured.
     """
     gains = seen[:, :_MEAN, None] / spread[:, None, None]
     seen[:, _MEAN] -= measured

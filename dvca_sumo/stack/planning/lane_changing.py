@@ -79,15 +79,15 @@ class LaneChanger:
             return LaneChoice()
         stop = last_stop(change, window, last - self._lane, speed, self._shape, self._config)
         has_to = is_last_chance(stop, speed)
-        patience = Urgency.HURRIED if stop.at < self._config.change_hurry * speed else Urgency.WANTED
+        urgency = Urgency.HURRIED if stop.at < self._config.change_hurry * speed else Urgency.WANTED
         occupied = self._gaps.occupied(change, window.station, objects)
         target = self._lane
         # A change begun in the other direction swings out far before it turns round.
         is_going_back = self._target == self._lane and abs(aside) > ARRIVED and speed > LAST_SPEED
         waits = is_going_back or is_at_junction(change, window, speed, self._shape, self._config)
         while target < last and (target < self._target or not waits):
-            urgency = Urgency.PRESSED if has_to or target < self._target else patience
-            if not self._gaps.is_free(occupied[target + 1], change, window, speed, urgency):
+            present = Urgency.PRESSED if has_to or target < self._target else urgency
+            if not self._gaps.is_free(occupied[target + 1], change, window, speed, present):
                 break
             target += 1
         width, beside = change.widths[self._lane], occupied[self._lane + 1]

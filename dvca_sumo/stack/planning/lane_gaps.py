@@ -131,11 +131,11 @@ class Gaps:
             is_ahead, speeds = np.append(is_ahead, False), np.append(speeds, speeds[-1])
         closing = np.where(is_ahead, speed - speeds, speeds - self._slowed(window, speed))
         opened = _CROSSING * np.maximum(-closing, 0.0)
-        left = np.where(closing > 0.0, config.headway, headway) if urgency == Urgency.CAN_WAIT else headway
+        behind = np.where(closing > 0.0, config.headway, headway) if urgency == Urgency.CAN_WAIT else headway
         kept = np.where(
             is_ahead,
             headway * speed - opened,
-            np.maximum(left * speeds - opened, config.expected_reaction * closing),
+            np.maximum(behind * speeds - opened, config.expected_reaction * closing),
         )
         needed = config.change_gap + np.maximum(kept, 0.0) + _braked(closing, braking)
         return bool((gaps >= needed).all())
