@@ -59,6 +59,11 @@ def edge_of(lane: str) -> str:
     return lane.rpartition("_")[0]
 
 
+def junction_of(lane: str) -> str:
+    """The junction of one of its lanes, with the colon that begins their names."""
+    return edge_of(edge_of(lane))
+
+
 def is_for_cars(net: Net, lane: str) -> bool:
     """Whether cars may use a lane."""
     return "passenger" in (net.allowed(lane) or ("passenger",))

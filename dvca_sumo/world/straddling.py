@@ -12,7 +12,7 @@ import shapely
 from dvca_sumo.geometry.boxes import box_of, corners
 from dvca_sumo.messages import VehicleShape
 from dvca_sumo.truth import EgoTruth
-from dvca_sumo.world.net import Net, edge_of, is_for_cars
+from dvca_sumo.world.net import Net, edge_of, is_for_cars, junction_of
 from dvca_sumo.world.ways import End, Ways
 
 SLOW = 5.0  # [m/s] above, an ego is on its way from one lane to the other, and soon on one
@@ -26,7 +26,7 @@ class Straddling:
     def __init__(self, net: Net, ways: Ways) -> None:
         self._net = net
         self._ways = ways
-        self._overlaid: dict[str, list[str]] = {}  # lanes of junctions that lie on one of a road
+        self._overlaid: dict[End, list[str]] = {}  # see `_lying_on`
         self._rooms: dict[str, float] = {}  # [m] of lanes, see `_room`
 
     def parts(
@@ -51,10 +51,11 @@ class Straddling:
         """Lanes whose drivers do not see a body at its route's `ends`, and how far into them it may be [m]."""
         front, rear = ends
         beside = [*self._ways.beside(front)]
-        for lane in dict.fromkeys(end.lane for end in ends if not end.origin):
-            near = self._net.adjacent(lane)
-            beside += [*near, lane] if found in near else near
-            beside += self._lying_on(lane)
+        for end in dict.fromkeys(ends):
+            if not end.origin:
+                near = self._net.adjacent(end.lane)
+                beside += [*near, end.lane] if found in near else near
+            beside += self._lying_on(end)
         # Who comes by the ego's tail cuts bends; who comes by its front it may be waiting for.
         return {lane: self._room(lane) for lane in beside} | dict.fromkeys(self._ways.behind(front, rear), 0.0)
 
@@ -65,17 +66,24 @@ class Straddling:
             self._rooms[lane] = 0.0 if is_for_buses else _ROOM
         return self._rooms[lane]
 
-    def _lying_on(self, lane: str) -> list[str]:
-        """Lanes of the junctions at the ends of a lane's road that lead onward over the lane, from and to elsewhere."""
-        if lane not in self._overlaid:
-            net, ways, road = self._net, self._ways, edge_of(lane)
-            own = {one for each in net.lanes_of(road) for way in ways.ways_from(each) for one in way}
-            junctions = dict.fromkeys(net.junctions_of(road))
-            across = [one for junction in junctions for one in ways.onward_lanes(f":{junction}")]
-            elsewhere = (one for one in across if one not in own and ways.road_after(one) != road)
-            area = _strip(*net.middle(lane))
-            self._overlaid[lane] = [one for one in elsewhere if _strip(*net.middle(one)).intersects(area)]
-        return self._overlaid[lane]
+    def _lying_on(self, end: End) -> list[str]:
+        """Lanes of junctions that lead onward over an end's lane, and whose drivers do not look for who is on it.
+
+        Of a road's lane, those from and to elsewhere at the road's ends; of a junction's lane, those whose drivers do
+        not mind it by the net, which has some ways side by side that are drawn one over the other.
+        """
+        if end not in self._overlaid:
+            net, ways, edge = self._net, self._ways, edge_of(end.lane)
+            origins, junctions = [end.origin], [junction_of(end.lane)]
+            if not end.origin:
+                origins, junctions = net.lanes_of(edge), [f":{name}" for name in dict.fromkeys(net.junctions_of(edge))]
+            own = {one for each in origins for way in ways.ways_from(each) for one in way}
+            across = [one for junction in junctions for one in ways.onward_lanes(junction)]
+            elsewhere = (one for one in across if one not in own and ways.road_after(one) != edge)
+            unseen = (one for one in elsewhere if end.lane not in net.foes(one))
+            area = _strip(*net.middle(end.lane))
+            self._overlaid[end] = [one for one in unseen if _strip(*net.middle(one)).intersects(area)]
+        return self._overlaid[end]
 
 
 def taken(

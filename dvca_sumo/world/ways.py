@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from dvca_sumo.world.net import Connections, edge_of, is_inner
+from dvca_sumo.world.net import Connections, edge_of, is_inner, junction_of
 
 
 class End(NamedTuple):
@@ -43,10 +43,10 @@ class Ways:
 
         They do so when its front has left the junction, though its tail may still be in their way.
         """
-        if not rear.origin or _junction_of(rear.lane) == _junction_of(front.lane):
+        if not rear.origin or junction_of(rear.lane) == junction_of(front.lane):
             return []
         edges = {edge_of(lane) for lane in self._way_of(rear)}
-        return [lane for lane in self.inner_lanes(_junction_of(rear.lane)) if edge_of(lane) not in edges]
+        return [lane for lane in self.inner_lanes(junction_of(rear.lane)) if edge_of(lane) not in edges]
 
     def inner_lanes(self, junction: str) -> list[str]:
         """The lanes of vehicles on a junction that lead on, by the beginning of their names."""
@@ -54,7 +54,7 @@ class Ways:
             if not self._named:
                 for lane in self._net.lanes():
                     if is_inner(lane) and edge_of(lane).rpartition("_")[2].isdecimal():
-                        self._named.setdefault(_junction_of(lane), []).append(lane)
+                        self._named.setdefault(junction_of(lane), []).append(lane)
             self._inner[junction] = [lane for lane in self._named.get(junction, []) if [*self._net.links(lane)]]
         return self._inner[junction]
 
@@ -86,7 +86,3 @@ class Ways:
         while onward := next((link.via for link in self._net.links(way[-1])), ""):
             way.append(onward)
         return way
-
-
-def _junction_of(lane: str) -> str:
-    return edge_of(edge_of(lane))

@@ -79,6 +79,10 @@ BULGE_EDGES = "".join(
 BULGING = """
 <trip id="ego" from="ab" to="bc" depart="0" departPos="150" departSpeed="0"/>
 <trip id="other" from="nb" to="bs" depart="6" departPos="100" departSpeed="8"/>"""
+# Who turns right comes near the way of who drives straight on; it is drawn to lead onto that one, or not.
+NEARBY = '<connection from="nb" to="ba" fromLane="0" toLane="0" shape="-1.6,12 {} -12,1.6"/>'
+NEARBY_EDGES = BULGE_EDGES.replace('id="bs" from="b" to="s"', 'id="ba" from="b" to="a"')
+TURNING = BULGING.replace('to="bs"', 'to="ba"')
 WALKING = """
 <trip id="ego" from="bc" to="bc" depart="0" departPos="40" departSpeed="0"/>
 <person id="walker" depart="0" departPos="70"><walk from="bc" to="bc" arrivalPos="200"/></person>"""
@@ -185,6 +189,14 @@ def test_who_crosses_a_road_before_the_junction_stops_for_an_ego_there(
 ) -> None:
     net = plain_file(CROSS_NODES, BULGE_EDGES.replace('"9"', '"1"', 1), BULGE.format(-16))
     assert _is_stopped_for(tmp_path, net, BULGING, lambda lane: lane == "ab_0", past) is stops
+
+
+@pytest.mark.parametrize(("corner", "stops"), [("-1.6,-1.6", True), ("-4,4", False)])
+def test_who_need_not_mind_the_egos_way_by_the_net_stops_for_an_ego_that_is_in_its_way(
+    tmp_path: Path, plain_file: Callable[..., Path], corner: str, *, stops: bool
+) -> None:
+    net = plain_file(CROSS_NODES, NEARBY_EDGES, NEARBY.format(corner))
+    assert _is_stopped_for(tmp_path, net, TURNING, lambda lane: lane.startswith(":"), 10.0) is stops
 
 
 @pytest.mark.parametrize(("who", "stops"), [("passenger", False), ("bus", True)])

@@ -18,6 +18,7 @@ MIDDLES = {
     "left_0": [(80.0, -60.0), (80.0, -10.0)],
     ":c_0_0": [(80.0, -10.0), (95.0, 10.0)],
 }
+FOES: dict[str, tuple[str, ...]] = {}
 LINKS = {"left_0": [Link("out_0", ":c_0_0")], ":c_0_0": [Link("out_0", "")]}
 
 
@@ -31,7 +32,7 @@ class Crossroads:
         return LINKS.get(lane, [])
 
     def foes(self, lane: str) -> tuple[str, ...]:
-        raise NotImplementedError(lane)
+        return FOES.get(lane, ())
 
     def adjacent(self, lane: str) -> list[str]:
         return {"in_0": ["in_1"], "in_1": ["in_0", "in_2"], "in_2": ["in_1"]}[lane]
