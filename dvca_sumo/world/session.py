@@ -397,7 +397,7 @@ class Session:
         if not self.has(shadow):
             if edge not in self._shadowed:
                 self._shadowed.add(edge)
-                road = self._ways.road_after(lane) if is_inner(lane) else edge
+                road = edge_of(self._ways.lane_after(lane)) if is_inner(lane) else edge
                 libsumo.route.add(f"{SHADOW}.{edge}", [road])
             of.add(shadow, f"{SHADOW}.{edge}", SHADOW)
         middle, _ = self._net.middle(lane)

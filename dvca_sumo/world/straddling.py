@@ -67,23 +67,37 @@ class Straddling:
         return self._rooms[lane]
 
     def _lying_on(self, end: End) -> list[str]:
-        """Lanes of junctions that lead onward over an end's lane, and whose drivers do not look for who is on it.
+        """Lanes over an end's lane, by which one leads onward, and whose drivers do not look for who is on it.
 
-        Of a road's lane, those from and to elsewhere at the road's ends; of a junction's lane, those whose drivers do
-        not mind it by the net, which has some ways side by side that are drawn one over the other.
+        Of a road's lane, those of the junctions at its ends, from and to elsewhere, and those that these lead to, but
+        for the same street's other direction. Of a junction's lane, those whose drivers do not mind it by the net,
+        which has some ways side by side that are drawn one over the other.
         """
         if end not in self._overlaid:
-            net, ways, edge = self._net, self._ways, edge_of(end.lane)
-            origins, junctions = [end.origin], [junction_of(end.lane)]
-            if not end.origin:
-                origins, junctions = net.lanes_of(edge), [f":{name}" for name in dict.fromkeys(net.junctions_of(edge))]
-            own = {one for each in origins for way in ways.ways_from(each) for one in way}
-            across = [one for junction in junctions for one in ways.onward_lanes(junction)]
-            elsewhere = (one for one in across if one not in own and ways.road_after(one) != edge)
-            unseen = (one for one in elsewhere if end.lane not in net.foes(one))
-            area = _strip(*net.middle(end.lane))
-            self._overlaid[end] = [one for one in unseen if _strip(*net.middle(one)).intersects(area)]
+            onward = self._onward_beside(end) if end.origin else self._onward_past(edge_of(end.lane))
+            unseen = (lane for lane in dict.fromkeys(onward) if end.lane not in self._net.foes(lane))
+            area = _strip(*self._net.middle(end.lane))
+            self._overlaid[end] = [lane for lane in unseen if _strip(*self._net.middle(lane)).intersects(area)]
         return self._overlaid[end]
+
+    def _onward_beside(self, end: End) -> list[str]:
+        """The lanes of a junction by which one leads onward, from elsewhere than an end on it has come."""
+        own = {lane for way in self._ways.ways_from(end.origin) for lane in way}
+        return [lane for lane in self._ways.onward_lanes(junction_of(end.lane)) if lane not in own]
+
+    def _onward_past(self, road: str) -> list[str]:
+        """The lanes of the junctions at a road's ends that lead onward, from and to elsewhere, and where they lead."""
+        net, ways = self._net, self._ways
+        begin, end = net.junctions_of(road)
+        own = {lane for each in net.lanes_of(road) for way in ways.ways_from(each) for lane in way}
+        found: list[str] = []
+        for lane in (lane for name in (begin, end) for lane in ways.onward_lanes(f":{name}") if lane not in own):
+            after = ways.lane_after(lane)
+            if edge_of(after) != road:
+                found.append(lane)
+                if net.junctions_of(edge_of(after)) != (end, begin):
+                    found.append(after)
+        return found
 
 
 def taken(

@@ -66,9 +66,9 @@ class Ways:
         lanes, links = self.inner_lanes(junction), self._net.links
         return [lane for lane in lanes if not any(link.turns_back for link in links(lane))]
 
-    def road_after(self, lane: str) -> str:
-        """The edge of a road that one of the `inner_lanes` leads to."""
-        return edge_of(next(iter(self._net.links(lane))).to)
+    def lane_after(self, lane: str) -> str:
+        """The lane of a road that one of the `inner_lanes` leads to."""
+        return next(iter(self._net.links(lane))).to
 
     def ways_from(self, lane: str) -> list[list[str]]:
         """The lanes of a junction, way by way, by which one leaves a lane of a road, without turns back."""

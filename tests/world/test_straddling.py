@@ -83,6 +83,10 @@ BULGING = """
 NEARBY = '<connection from="nb" to="ba" fromLane="0" toLane="0" shape="-1.6,12 {} -12,1.6"/>'
 NEARBY_EDGES = BULGE_EDGES.replace('id="bs" from="b" to="s"', 'id="ba" from="b" to="a"')
 TURNING = BULGING.replace('to="bs"', 'to="ba"')
+# Where it leads to lies beside the road on which the other comes, or on it.
+ONTO_EDGES = NEARBY_EDGES.replace('id="ba" from="b" to="a"', 'id="be" from="b" to="e" shape="0,{0} -200,{0}"')
+ONTO_NODES = CROSS_NODES + '<node id="e" x="-200" y="-30"/>'
+ONTO = TURNING.replace('to="ba"', 'to="be"')
 WALKING = """
 <trip id="ego" from="bc" to="bc" depart="0" departPos="40" departSpeed="0"/>
 <person id="walker" depart="0" departPos="70"><walk from="bc" to="bc" arrivalPos="200"/></person>"""
@@ -197,6 +201,16 @@ def test_who_need_not_mind_the_egos_way_by_the_net_stops_for_an_ego_that_is_in_i
 ) -> None:
     net = plain_file(CROSS_NODES, NEARBY_EDGES, NEARBY.format(corner))
     assert _is_stopped_for(tmp_path, net, TURNING, lambda lane: lane.startswith(":"), 10.0) is stops
+
+
+@pytest.mark.parametrize(("aside", "waits"), [(-3.2, True), (0.0, False)])  # [m] of the road that one turns into
+def test_who_turns_into_a_road_that_lies_on_the_egos_waits_at_the_line_for_it(
+    tmp_path: Path, plain_file: Callable[..., Path], aside: float, *, waits: bool
+) -> None:
+    net = plain_file(ONTO_NODES, ONTO_EDGES.format(aside))
+    gaps = _gaps_to_one_that_stops(tmp_path, net, ONTO, lambda lane: lane == "ab_0", 57.0)
+    assert min(gaps) > 0.3
+    assert (10.0 < gaps[-1] < 15.0) is waits
 
 
 @pytest.mark.parametrize(("who", "stops"), [("passenger", False), ("bus", True)])

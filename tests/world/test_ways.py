@@ -80,7 +80,7 @@ def test_names_tell_edges_and_junctions(ways: Ways) -> None:
     assert edge_of("a_b_1") == "a_b"
     assert is_inner(":c_0_0")
     assert not is_inner("c_0")
-    assert ways.road_after(":c_0_0") == "left"
+    assert ways.lane_after(":c_0_0") == "left_0"
     assert ways.inner_lanes("nowhere") == []
 
 

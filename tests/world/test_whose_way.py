@@ -1,4 +1,7 @@
-"""A road of three lanes, the rightmost of buses; over its last metres the junction's lane from elsewhere is drawn."""
+"""A road of three lanes, the rightmost of buses; over its last metres the junction's lane from elsewhere is drawn.
+
+So is, over other metres, the road where that leads to, and over all of them its own other direction.
+"""
 
 import pytest
 import shapely
@@ -16,10 +19,16 @@ MIDDLES = {
     "in_1": [(0.0, 0.0), (100.0, 0.0)],
     "in_2": [(0.0, 3.2), (100.0, 3.2)],
     "left_0": [(80.0, -60.0), (80.0, -10.0)],
+    "out_0": [(60.0, 0.0), (40.0, 0.0)],
+    "back_0": [(100.0, 0.0), (0.0, 0.0)],
     ":c_0_0": [(80.0, -10.0), (95.0, 10.0)],
+    ":c_1_0": [(80.0, -10.0), (70.0, -9.0)],
 }
-FOES: dict[str, tuple[str, ...]] = {}
-LINKS = {"left_0": [Link("out_0", ":c_0_0")], ":c_0_0": [Link("out_0", "")]}
+LINKS = {
+    "left_0": [Link("out_0", ":c_0_0"), Link("back_0", ":c_1_0")],
+    ":c_0_0": [Link("out_0", "")],
+    ":c_1_0": [Link("back_0", "")],
+}
 
 
 class Crossroads:
@@ -31,8 +40,8 @@ class Crossroads:
     def links(self, lane: str) -> list[Link]:
         return LINKS.get(lane, [])
 
-    def foes(self, lane: str) -> tuple[str, ...]:
-        return FOES.get(lane, ())
+    def foes(self, _: str) -> tuple[str, ...]:
+        return ()
 
     def adjacent(self, lane: str) -> list[str]:
         return {"in_0": ["in_1"], "in_1": ["in_0", "in_2"], "in_2": ["in_1"]}[lane]
@@ -47,7 +56,7 @@ class Crossroads:
         return [lane for lane in MIDDLES if edge_of(lane) == road]
 
     def junctions_of(self, road: str) -> tuple[str, str]:
-        return {"in": ("b", "c")}[road]
+        return {"in": ("b", "c"), "out": ("c", "d"), "back": ("c", "b")}[road]
 
 
 @pytest.fixture
@@ -80,6 +89,12 @@ def test_an_ego_that_sumo_has_on_the_next_lane_is_in_the_way_on_its_own(straddli
 
 def test_who_comes_over_the_road_from_elsewhere_sees_one_on_it(straddling: Straddling) -> None:
     assert [*straddling.parts(ego_at(84.0, 0.0), SHAPE, ends_on("in_1"), "in_1")] == [":c_0_0"]
+
+
+def test_who_turns_into_a_road_over_the_egos_sees_one_on_it_but_not_who_turns_into_the_same_street(
+    straddling: Straddling,
+) -> None:
+    assert straddling.parts(ego_at(45.0, 0.0), SHAPE, ends_on("in_1"), "in_1") == {"out_0": pytest.approx((11.0, 16.0))}
 
 
 def test_without_a_place_on_its_route_an_ego_is_in_nobodys_way(straddling: Straddling) -> None:
