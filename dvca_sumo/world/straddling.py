@@ -1,7 +1,8 @@
 """How much of a lane a body takes up that is beside the one SUMO has it on.
 
 SUMO has a vehicle on one lane. Its drivers on another one do not see a car that stands across both, half-way through
-turning back, between two lanes of a queue, or where ways on a junction lie side by side, and drive into it.
+turning back, between two lanes of a queue, where ways on a junction lie side by side, or where the net draws one lane
+over another, and drive into it.
 """
 
 import math
