@@ -1,7 +1,7 @@
 """The path decision: around what stands in the way, on which side and by how much, or not at all."""
 
 import math
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import msgspec
 
@@ -47,9 +47,9 @@ class NudgeDecider:
         self._followers: set[int] = set()  # tracks that were passed as far aside as those before them
 
     @property
-    def stood(self) -> Container[int]:
-        """The tracks that stood in the last cycle."""
-        return self._staying.since
+    def stood(self) -> set[int]:
+        """The tracks that stood in the last cycle; of people, those that did so for longer than a moment."""
+        return self._staying.settled
 
     def step(self, situation: Situation) -> tuple[list[Nudge], list[Plateau]]:
         """The nudges of this cycle by station, and where the ego has to be to go by all who stand beside its way.
@@ -299,7 +299,7 @@ class NudgeDecider:
         if (
             begun * offset > 0.0
             and abs(offset) <= abs(begun) + self._config.nudge_hold
-            and (blocker.track not in self.stood or situation.lateral.offset / offset > _COMMITTED)
+            and (blocker.track not in self._staying.since or situation.lateral.offset / offset > _COMMITTED)
         ):
             return True
         return self._will_stay(blocker, situation) and self._sides.has_been_free(blocker, offset, situation)

@@ -115,7 +115,7 @@ class Planner:
         signals: dict[str, SignalColour],
     ) -> tuple[Floats, str]:
         station, offset = located
-        predicted = self._standing.settled(predicted, self._nudging.stood)
+        predicted, stood = self._standing.settled(predicted, self._nudging.stood)
         config, shape = self._config, self._shape
         window = self._reference.window(station, self._reach(station, start.speed))
         choice = self._passing.step(window, offset, start.speed, predicted)
@@ -124,7 +124,7 @@ class Planner:
         if choice.keeping is not None:
             window = window.moved(choice.keeping.offsets, choice.keeping.begin, choice.keeping.width)
             offset -= float(choice.keeping.offsets[BEHIND])
-        scene = scene_in(window, predicted, time, self._nudging.stood, config)
+        scene = scene_in(window, predicted, time, stood, config)
         nose = station if config.lines_at_rear_axle else station + shape.front
         views = self._junctions.step(time, nose, station - shape.rear_overhang, start.speed, signals, predicted.objects)
         lateral = lateral_start(start, window, offset)

@@ -22,7 +22,7 @@ def test_noise_of_who_stands_averages_out_and_that_of_others_stays() -> None:
     rng = np.random.default_rng(4)
     standing, seen = Standing(), predicted([person(3, 20.0, 1.0), person(4, 30.0, 2.0), car(5, 40.0, 3.0)], 0.0)
     noise = rng.normal(0.0, 0.1, 200)
-    settled = np.array([standing.settled(shifted(seen, shift), {3, 5}).objects.boxes[:, 1] for shift in noise])
+    settled = np.array([standing.settled(shifted(seen, shift), {3, 5})[0].objects.boxes[:, 1] for shift in noise])
     spread = settled[50:].std(axis=0)
     assert spread[0] < 0.3 * noise.std()
     assert abs(settled[50:, 0].mean() - 1.0) < 0.02
@@ -33,8 +33,18 @@ def test_who_has_walked_on_is_where_it_is_seen_and_stands_anew_there() -> None:
     standing = Standing()
     standing.settled(predicted([person(3, 20.0, 1.0)], 0.0), {3})
     elsewhere = predicted([person(3, 25.0, 1.0)], 0.0)
-    assert standing.settled(elsewhere, set()) is elsewhere
-    assert standing.settled(elsewhere, {3}).objects.boxes[0, 0] == 25.0
+    assert standing.settled(elsewhere, set()) == (elsewhere, set())
+    assert standing.settled(elsewhere, {3})[0].objects.boxes[0, 0] == 25.0
+
+
+def test_who_walks_on_slowly_has_left_where_it_stood_and_is_where_it_is_seen() -> None:
+    standing, walker = Standing(), person(3, 20.0, 1.0, speed=0.45, leaves=2.0)
+    seen = [predicted([walker, person(4, 30.0, 2.0)], 0.1 * cycle) for cycle in range(60)]
+    told = [standing.settled(each, {3, 4}) for each in seen]
+    missed = [float(each.objects.boxes[0, 0] - by[0].objects.boxes[0, 0]) for each, by in zip(seen, told, strict=True)]
+    assert max(missed) < 0.3 + 1e-9
+    assert {stood == {4} for _, stood in told} == {True, False}
+    assert all(3 in stood for _, stood in told[:20])
 
 
 @pytest.mark.parametrize(("stood", "speed", "stands"), [((), 0.4, False), ((), 0.2, True), ((3,), 0.4, True)])

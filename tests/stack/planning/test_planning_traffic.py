@@ -21,7 +21,7 @@ from planned_drives import (
     stop_line,
 )
 
-from dvca_sumo.messages import PREDICTION_TIMES, SignalColour
+from dvca_sumo.messages import PREDICTION_TIMES, ObjectClass, SignalColour
 from dvca_sumo.roadmap.route import Control, Crossing, Overpass, Route
 from dvca_sumo.stack.planning import Planner, PlanningConfig
 
@@ -253,6 +253,21 @@ def test_ego_does_not_start_while_a_person_walks_along_its_side_and_into_it(x: f
     is_alongside = driven.states[:, 0] < (x - 99.1) / 1.2
     assert driven.speeds[is_alongside].max() == 0.0
     assert driven.fronts[-1] > 120.0
+
+
+class Hesitating(Actor, frozen=True):
+    """Who walks on slowly, and for a moment seems to stand."""
+
+    def speed_at(self, time: float) -> float:
+        return 0.2 if 0.25 < time < 0.35 else super().speed_at(time)
+
+
+@pytest.mark.parametrize("x", [19.5, 20.4, 21.5, 22.5])
+def test_standing_ego_does_not_set_off_beside_a_person_who_walks_up_slowly_and_hesitates(x: float) -> None:
+    walker = Hesitating(3, ObjectClass.PEDESTRIAN, x, -1.85, heading=math.pi / 2.0, speed=0.45, size=(0.5, 0.6))
+    driven = drive(road(), 1.5, station=20.0, actors=[walker])
+    assert driven.speeds[-1] == 0.0
+    assert driven.fronts[-1] - driven.fronts[0] < 0.02
 
 
 def test_person_who_is_long_across_before_the_ego_comes_is_no_reason_to_stop() -> None:
