@@ -381,7 +381,8 @@ class Session:
         adopted = self._adopted[ego]
         parts = {}
         if not self._has_sublanes:
-            taken = self._straddling.parts(truth, shape, ends, libsumo.vehicle.getLaneID(ego))
+            found = libsumo.vehicle.getLaneID(ego)
+            taken = self._straddling.parts(truth, shape, ends, found, goes=adopted.goes)
             parts = {lane: part for lane, part in taken.items() if not self._is_occupied(lane, *part, ego)}
         for lane in adopted.shadows:
             if lane not in parts:

@@ -27,11 +27,11 @@ class Straddling:
     def __init__(self, net: Net, ways: Ways) -> None:
         self._net = net
         self._ways = ways
-        self._overlaid: dict[End, list[str]] = {}  # see `_lying_on`
+        self._overlaid: dict[End, tuple[list[str], list[str]]] = {}  # see `_lying_on`
         self._rooms: dict[str, float] = {}  # [m] of lanes, see `_room`
 
     def parts(
-        self, truth: EgoTruth, shape: VehicleShape, ends: Sequence[End], found: str
+        self, truth: EgoTruth, shape: VehicleShape, ends: Sequence[End], found: str, *, goes: bool = True
     ) -> dict[str, tuple[float, float]]:
         """From where to where on which lanes an ego is in the way [m].
 
@@ -40,15 +40,17 @@ class Straddling:
             shape: Its body.
             ends: Where its front and its rear axle are on its route; none: it is on no second lane.
             found: The lane that SUMO has it on.
+            goes: Whether it means to go on. Else it may wait for those who stop for it in its own way.
         """
-        rooms = {lane: room for lane, room in self._rooms_around(ends, found).items() if lane != found} if ends else {}
+        around = self._rooms_around(ends, found, goes=goes) if ends else {}
+        rooms = {lane: room for lane, room in around.items() if lane != found}
         if not rooms:
             return {}
         body = _outline(truth, shape)
         parts = {lane: taken(body, *self._net.middle(lane), room) for lane, room in rooms.items()}
         return {lane: part for lane, part in parts.items() if part is not None}
 
-    def _rooms_around(self, ends: Sequence[End], found: str) -> dict[str, float]:
+    def _rooms_around(self, ends: Sequence[End], found: str, *, goes: bool) -> dict[str, float]:
         """Lanes whose drivers do not see a body at its route's `ends`, and how far into them it may be [m]."""
         front, rear = ends
         beside = [*self._ways.beside(front)]
@@ -56,7 +58,8 @@ class Straddling:
             if not end.origin:
                 near = self._net.adjacent(end.lane)
                 beside += [*near, end.lane] if found in near else near
-            beside += self._lying_on(end)
+            across, along = self._lying_on(end)
+            beside += across + along if goes else across
         # Who comes by the ego's tail cuts bends; who comes by its front it may be waiting for.
         return {lane: self._room(lane) for lane in beside} | dict.fromkeys(self._ways.behind(front, rear), 0.0)
 
@@ -67,38 +70,39 @@ class Straddling:
             self._rooms[lane] = 0.0 if is_for_buses else _ROOM
         return self._rooms[lane]
 
-    def _lying_on(self, end: End) -> list[str]:
+    def _lying_on(self, end: End) -> tuple[list[str], list[str]]:
         """Lanes over an end's lane, by which one leads onward, and whose drivers do not look for who is on it.
 
-        Of a road's lane, those of the junctions at its ends, from and to elsewhere, and those that these lead to, but
-        for the same street's other direction. Of a junction's lane, those whose drivers do not mind it by the net,
-        which has some ways side by side that are drawn one over the other.
+        The first ones lead across a road, over the junctions at its ends, from and to elsewhere. The second ones lead
+        along or against it: of a road's lane, those that the first ones lead to, but for the same street's other
+        direction; of a junction's lane, those whose drivers do not mind it by the net, which has some ways side by side
+        that are drawn one over the other.
         """
         if end not in self._overlaid:
-            onward = self._onward_beside(end) if end.origin else self._onward_past(edge_of(end.lane))
-            unseen = (lane for lane in dict.fromkeys(onward) if end.lane not in self._net.foes(lane))
-            area = _strip(*self._net.middle(end.lane))
-            self._overlaid[end] = [lane for lane in unseen if _strip(*self._net.middle(lane)).intersects(area)]
+            across, along = self._onward_past(edge_of(end.lane)) if not end.origin else ([], self._onward_beside(end))
+            self._overlaid[end] = self._over(end.lane, across), self._over(end.lane, along)
         return self._overlaid[end]
+
+    def _over(self, lane: str, others: list[str]) -> list[str]:
+        """Those of the others that lie over a lane, and whose drivers do not mind it."""
+        area = _strip(*self._net.middle(lane))
+        unseen = (other for other in dict.fromkeys(others) if lane not in self._net.foes(other))
+        return [other for other in unseen if _strip(*self._net.middle(other)).intersects(area)]
 
     def _onward_beside(self, end: End) -> list[str]:
         """The lanes of a junction by which one leads onward, from elsewhere than an end on it has come."""
         own = {lane for way in self._ways.ways_from(end.origin) for lane in way}
         return [lane for lane in self._ways.onward_lanes(junction_of(end.lane)) if lane not in own]
 
-    def _onward_past(self, road: str) -> list[str]:
+    def _onward_past(self, road: str) -> tuple[list[str], list[str]]:
         """The lanes of the junctions at a road's ends that lead onward, from and to elsewhere, and where they lead."""
         net, ways = self._net, self._ways
         begin, end = net.junctions_of(road)
         own = {lane for each in net.lanes_of(road) for way in ways.ways_from(each) for lane in way}
-        found: list[str] = []
-        for lane in (lane for name in (begin, end) for lane in ways.onward_lanes(f":{name}") if lane not in own):
-            after = ways.lane_after(lane)
-            if edge_of(after) != road:
-                found.append(lane)
-                if net.junctions_of(edge_of(after)) != (end, begin):
-                    found.append(after)
-        return found
+        lanes = [lane for name in (begin, end) for lane in ways.onward_lanes(f":{name}") if lane not in own]
+        onward = [lane for lane in lanes if edge_of(ways.lane_after(lane)) != road]
+        after = [ways.lane_after(lane) for lane in onward]
+        return onward, [lane for lane in after if net.junctions_of(edge_of(lane)) != (end, begin)]
 
 
 def taken(

@@ -203,6 +203,16 @@ def test_who_need_not_mind_the_egos_way_by_the_net_stops_for_an_ego_that_is_in_i
     assert _is_stopped_for(tmp_path, net, TURNING, lambda lane: lane.startswith(":"), 10.0) is stops
 
 
+def test_who_stops_for_an_ego_in_a_way_drawn_over_its_own_does_not_stay_for_ever(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    """The ego may wait for that one in turn."""
+    net = plain_file(CROSS_NODES, NEARBY_EDGES, NEARBY.format("-1.6,-1.6"))
+    gaps = _gaps_to_one_that_stops(tmp_path, net, TURNING, lambda lane: lane.startswith(":"), 10.0, steps=450)
+    assert max(gaps[250:290]) < 5.0  # it has stood for less than 20 s
+    assert gaps[-1] > 20.0
+
+
 @pytest.mark.parametrize(("aside", "waits"), [(-3.2, True), (0.0, False)])  # [m] of the road that one turns into
 def test_who_turns_into_a_road_that_lies_on_the_egos_waits_at_the_line_for_it(
     tmp_path: Path, plain_file: Callable[..., Path], aside: float, *, waits: bool
@@ -241,7 +251,13 @@ def _is_stopped_for(
 
 
 def _gaps_to_one_that_stops(
-    folder: Path, net: Path, traffic: str, is_there: Callable[[str], bool], past: float, aside: float = 0.0
+    folder: Path,
+    net: Path,
+    traffic: str,
+    is_there: Callable[[str], bool],
+    past: float,
+    aside: float = 0.0,
+    steps: int = 250,
 ) -> list[float]:
     """How far others are from an ego whose front stops so far [m] past the first of its lanes that is there.
 
@@ -255,7 +271,7 @@ def _gaps_to_one_that_stops(
         ego = world.adopt(entry, route, VehicleLimits())
         stop = next(row for row, lane in enumerate(route.lane_ids) if is_there(lane)) + past - ego.shape.front
         gaps = []
-        for station in np.minimum(ego.station() + 0.5 * np.arange(250), stop):
+        for station in np.minimum(ego.station() + 0.5 * np.arange(steps), stop):
             move = _to(route.line.poses(np.array([station]), aside)[0].tolist(), ego.truth)
             ego.vehicle.advance(ControlCommand(world.time, 0.0, 0.0, move), STEP)
             world.advance()
