@@ -31,7 +31,7 @@ class Straddling:
         self._rooms: dict[str, float] = {}  # [m] of lanes, see `_room`
 
     def parts(
-        self, truth: EgoTruth, shape: VehicleShape, ends: Sequence[End], found: str, *, goes: bool = True
+        self, truth: EgoTruth, shape: VehicleShape, ends: Sequence[End], found: str, *, goes: bool
     ) -> dict[str, tuple[float, float]]:
         """From where to where on which lanes an ego is in the way [m].
 
@@ -71,7 +71,7 @@ class Straddling:
         return self._rooms[lane]
 
     def _lying_on(self, end: End) -> tuple[list[str], list[str]]:
-        """Lanes over an end's lane, by which one leads onward, and whose drivers do not look for who is on it.
+        """Lanes over an end's lane, by which one gets onward, and whose drivers do not look for who is on it.
 
         The first ones lead across a road, over the junctions at its ends, from and to elsewhere. The second ones lead
         along or against it: of a road's lane, those that the first ones lead to, but for the same street's other
@@ -79,20 +79,20 @@ class Straddling:
         that are drawn one over the other.
         """
         if end not in self._overlaid:
-            across, along = self._onward_past(edge_of(end.lane)) if not end.origin else ([], self._onward_beside(end))
+            across, along = ([], self._onward_beside(end)) if end.origin else self._onward_past(edge_of(end.lane))
             self._overlaid[end] = self._over(end.lane, across), self._over(end.lane, along)
         return self._overlaid[end]
 
     def _over(self, lane: str, others: list[str]) -> list[str]:
-        """Those of the others that lie over a lane, and whose drivers do not mind it."""
+        """Those of the others that lie over a lane."""
         area = _strip(*self._net.middle(lane))
-        unseen = (other for other in dict.fromkeys(others) if lane not in self._net.foes(other))
-        return [other for other in unseen if _strip(*self._net.middle(other)).intersects(area)]
+        return [other for other in dict.fromkeys(others) if _strip(*self._net.middle(other)).intersects(area)]
 
     def _onward_beside(self, end: End) -> list[str]:
-        """The lanes of a junction by which one leads onward, from elsewhere than an end on it has come."""
+        """The lanes of a junction that lead onward from elsewhere than an end on it, whose drivers do not mind it."""
         own = {lane for way in self._ways.ways_from(end.origin) for lane in way}
-        return [lane for lane in self._ways.onward_lanes(junction_of(end.lane)) if lane not in own]
+        others = (lane for lane in self._ways.onward_lanes(junction_of(end.lane)) if lane not in own)
+        return [lane for lane in others if end.lane not in self._net.foes(lane)]
 
     def _onward_past(self, road: str) -> tuple[list[str], list[str]]:
         """The lanes of the junctions at a road's ends that lead onward, from and to elsewhere, and where they lead."""

@@ -40,8 +40,8 @@ class Crossroads:
     def links(self, lane: str) -> list[Link]:
         return LINKS.get(lane, [])
 
-    def foes(self, _: str) -> tuple[str, ...]:
-        return ()
+    def foes(self, lane: str) -> tuple[str, ...]:
+        raise NotImplementedError(lane)
 
     def adjacent(self, lane: str) -> list[str]:
         return {"in_0": ["in_1"], "in_1": ["in_0", "in_2"], "in_2": ["in_1"]}[lane]
@@ -78,24 +78,26 @@ def ends_on(lane: str) -> tuple[End, End]:
 def test_cars_have_room_beside_who_is_little_over_their_edge_and_buses_have_none(
     straddling: Straddling, y: float, lanes: list[str]
 ) -> None:
-    parts = straddling.parts(ego_at(20.0, y), SHAPE, ends_on("in_1"), "in_1")
+    parts = straddling.parts(ego_at(20.0, y), SHAPE, ends_on("in_1"), "in_1", goes=True)
     assert [*parts] == lanes
     assert all(part == pytest.approx((19.0, 24.0)) for part in parts.values())
 
 
 def test_an_ego_that_sumo_has_on_the_next_lane_is_in_the_way_on_its_own(straddling: Straddling) -> None:
-    assert [*straddling.parts(ego_at(20.0, 1.2), SHAPE, ends_on("in_1"), "in_2")] == ["in_1"]
+    assert [*straddling.parts(ego_at(20.0, 1.2), SHAPE, ends_on("in_1"), "in_2", goes=True)] == ["in_1"]
 
 
 def test_who_comes_over_the_road_from_elsewhere_sees_one_on_it(straddling: Straddling) -> None:
-    assert [*straddling.parts(ego_at(84.0, 0.0), SHAPE, ends_on("in_1"), "in_1")] == [":c_0_0"]
+    for goes in (True, False):
+        assert [*straddling.parts(ego_at(84.0, 0.0), SHAPE, ends_on("in_1"), "in_1", goes=goes)] == [":c_0_0"]
 
 
-def test_who_turns_into_a_road_over_the_egos_sees_one_on_it_but_not_who_turns_into_the_same_street(
-    straddling: Straddling,
+@pytest.mark.parametrize(("goes", "parts"), [(True, {"out_0": pytest.approx((11.0, 16.0))}), (False, {})])
+def test_who_turns_into_a_road_over_the_egos_sees_one_that_means_to_go_but_not_who_turns_into_the_same_street(
+    straddling: Straddling, parts: dict[str, tuple[float, float]], *, goes: bool
 ) -> None:
-    assert straddling.parts(ego_at(45.0, 0.0), SHAPE, ends_on("in_1"), "in_1") == {"out_0": pytest.approx((11.0, 16.0))}
+    assert straddling.parts(ego_at(45.0, 0.0), SHAPE, ends_on("in_1"), "in_1", goes=goes) == parts
 
 
 def test_without_a_place_on_its_route_an_ego_is_in_nobodys_way(straddling: Straddling) -> None:
-    assert straddling.parts(ego_at(20.0, 1.2), SHAPE, (), "in_1") == {}
+    assert straddling.parts(ego_at(20.0, 1.2), SHAPE, (), "in_1", goes=True) == {}
