@@ -49,7 +49,7 @@ class NudgeDecider:
     @property
     def stood(self) -> set[int]:
         """The tracks that stood in the last cycle; of people, those that did so for longer than a moment."""
-        return self._staying.settled
+        return self._staying.stood
 
     def step(self, situation: Situation) -> tuple[list[Nudge], list[Plateau]]:
         """The nudges of this cycle by station, and where the ego has to be to go by all who stand beside its way.

@@ -19,7 +19,7 @@ class Staying:
 
     def __init__(self, shape: VehicleShape, config: PlanningConfig) -> None:
         self.since: dict[int, float] = {}  # by track, of those who stand: when they came to [s]
-        self.settled: set[int] = set()  # tracks of those, but for people who may have slowed down for a moment
+        self.stood: set[int] = set()  # tracks of those, but for people who may have slowed down for a moment
         self._shape = shape
         self._config = config
         self._moving: dict[int, float] = {}  # by track: when it came to move [s]
@@ -29,14 +29,14 @@ class Staying:
         """Take in the next cycle's scene."""
         ids, time = situation.scene.ids, situation.time
         stood, moved = self.since, self._moving
-        self.since, self.settled, self._moving = {}, set(), {}
+        self.since, self.stood, self._moving = {}, set(), {}
         self._driven.intersection_update(ids)
         scene = situation.scene
         for track, is_standing, kind in zip(ids, scene.is_standing.tolist(), scene.classes.tolist(), strict=True):
             if is_standing:
                 since = self.since[track] = stood.get(track, time)
                 if kind != _PERSON or time - since > _HESITATING:
-                    self.settled.add(track)
+                    self.stood.add(track)
                 continue
             since = self._moving[track] = moved.get(track, time)
             if time - since > _DRIVING:
