@@ -1,5 +1,6 @@
 """Whose turn it is where the ways of the ego and of somebody else meet: pass before, or yield."""
 
+import enum
 import math
 from collections.abc import Iterable
 
@@ -24,6 +25,15 @@ _BRUSHING = 0.2  # ... for those who would come so near to it, before it has pas
 _BRUSHING_AT_REST = 0.35  # ... one at rest can wait [m]
 _SLOWS = 1.0  # [s] that others are foreseen to lose in bends and by braking, and may not lose
 _CLEAR_GAP = 0.5  # [m] lengthwise behind somebody who has passed
+
+
+class _Turn(enum.Enum):
+    """Who goes first where two ways meet."""
+
+    OURS = enum.auto()  # the other has to give way
+    THEIRS = enum.auto()  # it has priority
+    NOBODYS = enum.auto()  # both keep their lanes, which the map draws one on the other: who is there first
+    CUT_IN = enum.auto()  # the other comes into our lane, off the junctions, and has to see to it
 
 
 class Demand(msgspec.Struct, frozen=True):
@@ -67,17 +77,18 @@ class Meetings:
     def _demand(self, row: int, graph: Graph, views: list[LineView], profile: Profile) -> Demand | None:
         config = self._config
         entry = float(graph.scene.times[graph.first[row]])
-        others_first = self._others_first(row, graph, views)
-        if others_first is None:
+        turn = self._turn(row, graph, views)
+        if turn is _Turn.CUT_IN:
             return self._cut_in(row, graph, profile)
-        if not others_first and self._will_wait(row, entry, graph):
+        is_ours = turn is _Turn.OURS
+        if is_ours and self._will_wait(row, entry, graph):
             return None
         margin = config.pass_margin_prior
-        if others_first:
+        if turn is _Turn.THEIRS:
             margin = config.pass_margin - (config.pass_hold if graph.track(row) in self._passing else 0.0)
         if margin < config.pass_margin and self._passes([row], graph, profile, margin)[0]:
             return None
-        stop = self._stop(row, graph, views if others_first else [])
+        stop = self._stop(row, graph, [] if is_ours else views)
         if self._moves_up(row, stop, graph, profile):
             stop = msgspec.structs.replace(stop, at=0.0, give=stop.at + stop.give)
         room = stop.at + stop.give
@@ -85,7 +96,7 @@ class Meetings:
             return None
         needed = profile.speeds[0] ** 2 / (2.0 * max(room, _LEAST_ROOM))
         is_too_late = needed > config.hard_braking and (
-            (not others_first and self._may_stop(row, entry, graph))  # the sooner the ego is gone, the better
+            (is_ours and self._may_stop(row, entry, graph))  # the sooner the ego is gone, the better
             or self._passes([row], graph, profile, 0.0)[0]
         )
         if is_too_late or (needed > config.comfort_braking and self._goes_on(row, graph, profile)):
@@ -190,24 +201,26 @@ class Meetings:
         front = np.interp(times, STEP_TIMES, profile.arcs) + (self._shape.front + _CLEAR_GAP)
         return _whenever_there(rows, front < graph.begins.take(rows, axis=0), graph)
 
-    def _others_first(self, row: int, graph: Graph, views: list[LineView]) -> bool | None:
-        """Whether the other has priority. People have, but before a crossing where they have to wait.
+    def _turn(self, row: int, graph: Graph, views: list[LineView]) -> _Turn:
+        """Whose turn it is. People have priority, but before a crossing where they have to wait.
 
         On junctions the map tells; elsewhere, who leaves its lane has not. That is the ego itself where its line has
-        left the lane, in turns that it cannot drive within, or the other: None, it cuts in. Neither has where the map
-        draws two lanes one on the other.
+        left the lane, in turns that it cannot drive within, or the other, which cuts in. Nobody has who keeps a lane of
+        its own that the map draws on the ego's.
         """
         scene = graph.scene
         near, far = (graph.window.station + float(ends[row, graph.first[row]]) for ends in (graph.low, graph.high))
         told = has_priority(views, near, far, scene.lanes[row])
         if scene.is_person[row]:
-            return told is not False or len(scene.lanes[row]) < _STILL_TO_CROSS
+            is_theirs = told is not False or len(scene.lanes[row]) < _STILL_TO_CROSS
+            return _Turn.THEIRS if is_theirs else _Turn.OURS
         if told is not None:
-            return told
-        keeps_lane = bool(scene.lanes[row]) and self._lanes.isdisjoint(scene.lanes[row])
-        if keeps_lane or graph.is_off_lane(row, self._shape.width):
-            return True
-        return None if self._cuts_in(row, graph) else True
+            return _Turn.THEIRS if told else _Turn.OURS
+        if graph.is_off_lane(row, self._shape.width):
+            return _Turn.THEIRS
+        if scene.lanes[row] and self._lanes.isdisjoint(scene.lanes[row]):
+            return _Turn.NOBODYS
+        return _Turn.CUT_IN if self._cuts_in(row, graph) else _Turn.THEIRS
 
     def _cuts_in(self, row: int, graph: Graph) -> bool:
         futures, first = graph.scene.futures, graph.first[row]
@@ -237,7 +250,9 @@ class Meetings:
         if self._joins(row, graph):
             nearest, until = float(graph.low[row, first]), float(scene.times[first])
         else:
-            nearest = float(graph.low[row][graph.occupied[row]].min())
+            # Who drives along beside comes into the way with its nose, or one corner; who crosses, as wide as it is.
+            places = graph.begins if scene.futures.directions[row, first] > ALONG else graph.low
+            nearest = float(places[row][graph.occupied[row]].min())
             until = float(scene.times[last]) + config.clear_margin
             if last == len(scene.times) - 1:
                 until = math.inf

@@ -122,6 +122,17 @@ class Actor(msgspec.Struct, frozen=True):
         return [x, self.y + way * math.sin(self.heading), self.heading, *self.size]
 
 
+class Winding(Actor, frozen=True, kw_only=True):
+    """Somebody who drives along a line of their own, at its beginning until `leaves`."""
+
+    line: Polyline
+
+    def box_at(self, time: float) -> list[float]:
+        way = min(self.speed * max(time - self.leaves, 0.0), self.line.length)
+        pose: list[float] = self.line.poses(np.array([way]))[0].tolist()
+        return [*pose, *self.size]
+
+
 def person(track: int, x: float, y: float, **changes: Any) -> Actor:
     return Actor(track, ObjectClass.PEDESTRIAN, x, y, size=(0.5, 0.6), **changes)
 
@@ -135,7 +146,7 @@ def car(track: int, x: float, y: float = 0.0, **changes: Any) -> Actor:
 
 
 def predicted(actors: Sequence[Actor], time: float) -> PredictedObjects:
-    """Each actor with one hypothesis: constant velocity, or braking as it does."""
+    """Each actor with one hypothesis: constant velocity, or braking or along its line, as it does."""
     count = len(actors)
     boxes = np.array([actor.box_at(time) for actor in actors]).reshape(count, 5)
     speeds = np.array([actor.speed_at(time) for actor in actors])
@@ -144,7 +155,7 @@ def predicted(actors: Sequence[Actor], time: float) -> PredictedObjects:
     poses = np.repeat(boxes[:, None, :3], len(PREDICTION_TIMES), axis=1)
     poses[:, :, :2] += velocities[:, None, :] * PREDICTION_TIMES[None, :, None]
     for row, actor in enumerate(actors):
-        if actor.braking:
+        if actor.braking or isinstance(actor, Winding):
             poses[row] = [actor.box_at(time + ahead)[:3] for ahead in PREDICTION_TIMES.tolist()]
     objects = TrackedObjects(
         time=time,

@@ -9,6 +9,7 @@ from planned_drives import (
     SHAPE,
     Actor,
     Drive,
+    Winding,
     assert_drivable,
     believed,
     bent_points,
@@ -21,6 +22,7 @@ from planned_drives import (
     stop_line,
 )
 
+from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import PREDICTION_TIMES, ObjectClass, SignalColour
 from dvca_sumo.roadmap.route import Control, Crossing, Overpass, Route
 from dvca_sumo.stack.planning import Planner, PlanningConfig
@@ -458,6 +460,24 @@ def test_ego_in_a_left_turn_stops_before_the_way_of_a_bus_that_first_comes_past_
     driven = drive(route, 20.0, station=100.0, speed=speed, actors=[bus])
     assert driven.clearances.min() > 0.4
     assert driven.states[-1, 2] > 40.0
+
+
+@pytest.mark.parametrize(("first", "apart"), [(0.0, 3.0), (-2.0, 3.0), (-4.0, 3.5), (0.0, 2.5)])  # [s]
+def test_ego_goes_between_those_who_swing_over_its_lane_from_the_next_where_the_map_gives_nobody_priority(
+    first: float, apart: float
+) -> None:
+    curvatures = np.zeros(90)
+    curvatures[36:40], curvatures[41:53] = -0.6 / 4.0, 2.0 / 12.0
+    line = Polyline(bent_points(curvatures) + np.array([0.0, 3.6]))
+    stream = [
+        Winding(
+            3 + k, ObjectClass.VEHICLE, 0.0, 3.6, speed=8.0, leaves=first + apart * k, lanes=("minor_0",), line=line
+        )
+        for k in range(9)
+    ]
+    driven = drive(road(), 20.0, speed=5.0, actors=stream)
+    assert driven.fronts[-1] > 60.0
+    assert driven.clearances.min() > 0.8
 
 
 def test_who_drives_along_on_the_inner_lane_of_a_roundabout_is_no_reason_to_slow_down() -> None:
