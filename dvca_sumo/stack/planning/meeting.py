@@ -205,8 +205,8 @@ class Meetings:
         """Whose turn it is. People have priority, but before a crossing where they have to wait.
 
         On junctions the map tells; elsewhere, who leaves its lane has not. That is the ego itself where its line has
-        left the lane, in turns that it cannot drive within, or the other, which cuts in. Nobody has who keeps a lane of
-        its own that the map draws on the ego's.
+        left the lane, in turns that it cannot drive within, or the other, which cuts in. It is nobody's turn where the
+        other keeps a lane of its own that the map draws on the ego's.
         """
         scene = graph.scene
         near, far = (graph.window.station + float(ends[row, graph.first[row]]) for ends in (graph.low, graph.high))
