@@ -21,8 +21,7 @@ _STILL_TO_CROSS = 2  # lanes of a person's future: a pavement, then a crossing
 _LEAST_ROOM = 0.1  # [m]
 _SLOW = 4.0  # [m/s] no faster, an ego stops for people who come up to its side: ...
 _BESIDE_PERSON = 1.0  # ... [m] behind its front bumper, and all along it ...
-_BRUSHING = 0.2  # ... for those who would come so near to it, before it has passed them [m]; ...
-_BRUSHING_AT_REST = 0.35  # ... one at rest can wait [m]
+_BRUSHING = 0.2  # ... for those who would come so near to it, before it has passed them [m]: one at rest can wait
 _SLOWS = 1.0  # [s] that others are foreseen to lose in bends and by braking, and may not lose
 _CLEAR_GAP = 0.5  # [m] lengthwise behind somebody who has passed
 
@@ -148,7 +147,7 @@ class Meetings:
     def _brushes(self, row: int, graph: Graph, profile: Profile) -> bool:
         """Whether somebody comes up to the body, as future `row` has it, while that is still there: one at rest is."""
         if profile.speeds[0] < self._config.standing_speed:
-            return bool((graph.occupied[row] & (graph.gaps[row] < _BRUSHING_AT_REST)).any())
+            return bool((graph.occupied[row] & (graph.gaps[row] < self._config.setting_off_margin)).any())
         near = graph.occupied[row] & (graph.gaps[row] < _BRUSHING)
         rear = np.interp(graph.scene.times[near], STEP_TIMES, profile.arcs) - self._shape.rear_overhang
         return bool((rear <= graph.high[row, near]).any())

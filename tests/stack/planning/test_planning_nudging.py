@@ -285,7 +285,7 @@ def test_ego_does_not_start_past_a_person_who_has_come_to_stand_right_beside_it(
 @pytest.mark.parametrize("ahead", [1.0, 2.0, 3.0])
 def test_no_room_is_made_for_who_is_met_before_there_can_be_any(ahead: float) -> None:
     walker = person(5, 20.0 + SHAPE.front + ahead, -1.7, heading=math.pi, speed=1.7)
-    driven = drive(road(limit=8.0), 10.0, station=20.0, actors=[walker])
+    driven = drive(road(limit=8.0), 14.0, station=20.0, actors=[walker])
     assert driven.clearances.min() > 0.35
     assert offsets(driven)[1] < 0.1
     assert driven.fronts[-1] > 60.0
@@ -309,7 +309,7 @@ def test_ego_that_stands_does_not_set_off_while_somebody_walks_close_by_its_fron
     def setting_off(gap: float) -> int:
         y = -(0.5 * (SHAPE.width + 0.6) + gap)
         walker = person(5, 20.0 + SHAPE.front + ahead, y, heading=heading, speed=1.3)
-        driven = drive(road(limit=8.0), 12.0, station=20.0, actors=[walker])
+        driven = drive(road(limit=8.0), 16.0, station=20.0, actors=[walker])
         assert driven.fronts[-1] > 80.0
         return int((driven.speeds > 0.3).argmax())
 

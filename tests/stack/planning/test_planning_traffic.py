@@ -257,6 +257,19 @@ def test_ego_does_not_start_while_a_person_walks_along_its_side_and_into_it(x: f
     assert driven.fronts[-1] > 120.0
 
 
+@pytest.mark.parametrize("gap", [0.3, 0.4, 0.45])
+@pytest.mark.parametrize(("x", "heading"), [(103.0, math.pi), (101.5, math.pi), (101.5, 0.0)])
+def test_ego_at_rest_does_not_start_while_a_person_walks_slowly_along_its_side(
+    x: float, heading: float, gap: float
+) -> None:
+    """Who walks may sway by as much as is left in a step."""
+    walker = person(3, x, -(0.5 * (SHAPE.width + 0.6) + gap), heading=heading, speed=0.8)
+    driven = drive(road(), 14.0, station=100.0, actors=[walker])
+    along = driven.states[:, 0] * 0.8 * math.cos(heading) + x
+    assert driven.speeds[(along > 100.0 - SHAPE.rear_overhang) & (along < 100.0 + SHAPE.front)].max() == 0.0
+    assert driven.fronts[-1] > 120.0
+
+
 class Hesitating(Actor, frozen=True):
     """Who walks on slowly, and for a moment seems to stand."""
 
