@@ -11,11 +11,10 @@ from dvca_sumo.messages import Floats, VehicleShape
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.moves import Lateral, Move, bent_less, blend_length, feasible_length, moved, roomy_length
 from dvca_sumo.stack.planning.reference import BEHIND, Window, swept
-from dvca_sumo.stack.planning.start import StartState
+from dvca_sumo.stack.planning.start import STANDING, StartState
 
 _AT_REST = 0.2  # [m] less than that does not make the front swing out
 _STEEPEST = 0.55  # [rad] largest angle between path and reference line
-_STANDING = 0.05  # [m/s]
 _SHARPEST = 0.25  # [1/m] largest initial second derivative taken over from the start state
 _UNDERWAY = 1.5  # of a move's length: a move begun early, because the ego was faster then, is not taken back
 _FADE: Floats = np.exp(np.arange(30) / -5.0)  # by station: how much is left of what projection missed the start by
@@ -54,7 +53,7 @@ def lateral_start(start: StartState, window: Window, offset: float) -> Lateral:
     tangent = math.tan(min(max(angle, -_STEEPEST), _STEEPEST))
     cosine = 1.0 / math.hypot(1.0, tangent)
     bend = (start.curvature * scale / cosine - curvature) * scale / (cosine * cosine)
-    if start.speed < _STANDING:
+    if start.speed < STANDING:
         bend = 0.0
     return Lateral(offset, scale * tangent, min(max(bend, -_SHARPEST), _SHARPEST))
 

@@ -8,6 +8,8 @@ from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.messages import LocalizationEstimate, Trajectory
 from dvca_sumo.stack.planning.config import PlanningConfig
 
+STANDING = 0.05  # [m/s]
+
 
 class StartState(msgspec.Struct, frozen=True, gc=False):
     """Row 0 of the trajectory to be planned (rear axle)."""
@@ -23,12 +25,16 @@ class StartState(msgspec.Struct, frozen=True, gc=False):
 def start_state(previous: Trajectory | None, localization: LocalizationEstimate, config: PlanningConfig) -> StartState:
     """The previous trajectory at the present time if the believed pose is near it, else the believed state.
 
-    Continuing what was planned keeps the plan smooth: control's deviations are control's to remove.
+    Continuing what was planned keeps the plan smooth: control's deviations are control's to remove. While the ego is to
+    stand, control cannot: it sets off as planned from where it is.
     """
     if previous is not None:
         planned = _at(previous, localization.time)
         if planned is not None and _is_near(planned, localization, config):
-            return planned
+            if planned.speed >= STANDING:
+                return planned
+            x, y, heading = localization.x, localization.y, localization.heading
+            return msgspec.structs.replace(planned, x=x, y=y, heading=heading)
     comfort = (-config.hard_braking, config.acceleration)
     return StartState(
         x=localization.x,

@@ -35,6 +35,18 @@ def test_small_deviation_goes_on_from_the_previous_trajectory() -> None:
     assert np.abs(second.points[0, 1:5] - first.points[1, 1:5]).max() < 1e-6
 
 
+def test_ego_that_stands_sets_off_from_where_it_is() -> None:
+    """What control left when it stopped would stay between the plan and the body, beside whom it passes."""
+    plan, waits = planner(), predicted([car(3, 58.0)], 0.0)
+    plan.step(believed(50.0), waits, {})
+    beside = believed(50.2, 0.2, -0.1, time=0.1)
+    points = plan.step(beside, waits, {}).points
+    assert np.abs(points[0, 1:5] - [50.2, 0.2, -0.1, 0.0]).max() < 1e-3
+    for cycle in range(2, 12):
+        points = plan.step(msgspec.structs.replace(beside, time=0.1 * cycle), NOBODY, {}).points
+    assert points[0, 4] > 1.0  # though nobody reports that it moves
+
+
 def test_far_deviation_starts_again_from_the_believed_state() -> None:
     for believed_state in (
         believed(51.0, 0.8, 0.0, 10.0, time=0.1),
