@@ -44,6 +44,7 @@ class NeighboursSummary(msgspec.Struct, frozen=True):
 
     hours: float  # [h] that they were under way, all together
     stood_per_100_hours: Rate  # of them, for two minutes or longer without a stop of their own
+    queues_per_100_hours: Rate  # in which those stood
     teleports_per_100_hours: Rate
 
 
@@ -112,6 +113,7 @@ def summary_of(results: Sequence[TripResult], like: Sequence[TripResult], neighb
         neighbours=NeighboursSummary(
             hours=neighbours.hours,
             stood_per_100_hours=rate_of(neighbours.stood, neighbours.hours / 100.0),
+            queues_per_100_hours=rate_of(neighbours.queues, neighbours.hours / 100.0),
             teleports_per_100_hours=rate_of(neighbours.teleports, neighbours.hours / 100.0),
         ),
     )

@@ -98,6 +98,10 @@ class World:
         """How long each vehicle that SUMO drives has stood [s], by name; 0 while it makes a stop of its own."""
         return self._session.waits()
 
+    def leader(self, vehicle: str, reach: float) -> str | None:
+        """Who is ahead of a vehicle that SUMO drives, on its way and no farther than `reach` [m]."""
+        return self._session.leader(vehicle, reach)
+
     def entry(self, vehicle: str, settings: Sequence[str]) -> Entry:
         """How a vehicle that has just departed stands, and its "dvca." parameters among `settings`."""
         return self._session.entry(vehicle, settings)

@@ -259,6 +259,11 @@ class Session:
         names = (name for name in of.getIDList() if name not in self._adopted and not _is_shadow(name))
         return {name: 0.0 if of.isStopped(name) else float(of.getWaitingTime(name)) for name in names}
 
+    def leader(self, vehicle: str, reach: float) -> str | None:
+        """Who is ahead of a vehicle that SUMO drives, on its way and no farther than `reach` [m]."""
+        found = libsumo.vehicle.getLeader(vehicle, reach)  # on the same lane however far
+        return found[0] if found and found[0] and found[1] <= reach else None
+
     def motion(self, vehicle: str) -> Motion:
         """How a vehicle moves that SUMO drives."""
         of = libsumo.vehicle

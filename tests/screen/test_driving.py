@@ -185,16 +185,19 @@ def test_an_ego_is_not_held_up_by_a_queue_that_another_ego_heads(tmp_path: Path,
 
 
 @pytest.mark.parametrize(
-    ("patience", "stood", "teleports"), [("-1", 2, 0), ("130", 1, 1)], ids=["for ever", "the first is teleported"]
+    ("patience", "farther", "stood", "queues", "teleports"),
+    [("-1", "", 2, 1, 0), ("-1", "300", 3, 2, 0), ("130", "", 1, 1, 1)],
+    ids=["for ever", "another one farther on", "the first is teleported"],
 )
 def test_sumos_vehicles_that_stand_and_are_teleported_are_counted(
-    tmp_path: Path, lane: Path, patience: str, stood: int, teleports: int
+    tmp_path: Path, lane: Path, patience: str, farther: str, stood: int, queues: int, teleports: int
 ) -> None:
-    routes = (
-        '<vType id="stuck" maxSpeed="0.01"/><vehicle id="other" type="stuck" depart="0" departPos="195">'
-        '<route edges="we"/></vehicle><trip id="ego" from="we" to="we" depart="1"/>'
+    stuck = (
+        f'<vehicle id="at_{place}" type="stuck" depart="0" departPos="{place}"><route edges="we"/></vehicle>'
+        for place in ["195", *farther.split()]
     )
+    routes = f'<vType id="stuck" maxSpeed="0.01"/>{"".join(stuck)}<trip id="ego" from="we" to="we" depart="1"/>'
     scenario = traffic(tmp_path, lane, routes, end="200", time_to_teleport=patience)
     found = in_child(partial(anchored, scenario, [Trip("ego", 1.0, 395.0, 29.0, 40.0)], HEAR)).neighbours
-    assert (found.stood, found.teleports) == (stood, teleports)
-    assert 0.0 < found.hours <= 2 * 200.0 / 3600.0
+    assert (found.stood, found.queues, found.teleports) == (stood, queues, teleports)
+    assert 0.0 < found.hours <= (stood + 1) * 200.0 / 3600.0

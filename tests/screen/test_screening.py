@@ -129,7 +129,7 @@ def test_trips_that_the_simulator_ended_or_the_scenario_cut_off_are_counted_apar
     trips += [
         TripResult(fault, TripOutcome.CONTACT, violations=(Judged("collision", contact, fault, ""),)) for fault in Fault
     ]
-    found = summary_of(trips, [], Neighbours(0.0, 0, 0))
+    found = summary_of(trips, [], Neighbours(0.0, 0, 0, 0))
     assert (found.trips, found.ended_by_simulator, found.cut) == (5, 1, 1)
     assert (found.completed.count, found.completed.total) == (1, 3)
 
