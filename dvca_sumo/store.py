@@ -24,13 +24,14 @@ class Store(Generic[Kept]):
     """A file of answers of one kind, one a line, each under the key of what was asked."""
 
     def __init__(self, path: Path, kind: type[Kept]) -> None:
-        """Read what is there.
+        """Read what is there. What the answers of other questions say is not looked at: other code may have given them.
 
         Raises:
             StoreError: The file cannot be read or made, or holds something else.
         """
         self._path = path
-        self._known: dict[str, Kept] = {}
+        self._kind = kind
+        self._known: dict[str, msgspec.Raw] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
@@ -41,19 +42,28 @@ class Store(Generic[Kept]):
         for number, text in enumerate(lines, 1):
             try:
                 line = msgspec.json.decode(text, type=_Line)
-                self._known[line.key] = msgspec.json.decode(line.value, type=kind)
             except (msgspec.DecodeError, msgspec.ValidationError) as error:
                 raise StoreError(f"line {number} of {path} is no {kind.__name__}: {error}") from None
+            self._known[line.key] = line.value
 
     def find(self, key: str) -> Kept | None:
-        """What was found for that question before."""
-        return self._known.get(key)
+        """What was found for that question before.
+
+        Raises:
+            StoreError: Something else is kept there.
+        """
+        if key not in self._known:
+            return None
+        try:
+            return msgspec.json.decode(self._known[key], type=self._kind)
+        except msgspec.ValidationError as error:
+            raise StoreError(f"what {self._path} keeps under {key} is no {self._kind.__name__}: {error}") from None
 
     def add(self, key: str, value: Kept) -> None:
         """Keep an answer: it is on disk when this returns."""
-        self._known[key] = value
+        self._known[key] = msgspec.Raw(msgspec.json.encode(value))
         with self._path.open("ab") as file:
-            file.write(msgspec.json.encode(_Line(key, msgspec.Raw(msgspec.json.encode(value)))) + b"\n")
+            file.write(msgspec.json.encode(_Line(key, self._known[key])) + b"\n")
 
 
 def key_of(parts: Sequence[object]) -> str:

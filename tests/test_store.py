@@ -39,6 +39,17 @@ def test_a_file_of_something_else_is_named_with_its_line(tmp_path: Path) -> None
         Store(tmp_path / "scores.jsonl", Score)
 
 
+def test_what_older_code_kept_in_another_form_is_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "scores.jsonl"
+    path.write_text('{"key":"old","value":{"of":"another form"}}\n')
+    store = Store(path, Score)
+    store.add("new", score())
+    again = Store(path, Score)
+    assert again.find("new") == score()
+    with pytest.raises(StoreError, match=r"what .*scores\.jsonl keeps under old is no Score"):
+        again.find("old")
+
+
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(StoreError, match="results cannot be kept in"):
