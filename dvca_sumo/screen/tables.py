@@ -185,7 +185,7 @@ _ROWS: Sequence[tuple[str, Callable[[DriverSummary], str]]] = (
         "SUMO's vehicles that stood for 2 min, per 100 h of theirs",
         lambda one: _rate(one.neighbours.stood_per_100_hours, 1),
     ),
-    ("queues in which those stood", lambda one: _rate(one.neighbours.queues_per_100_hours, 1)),
+    ("queues in which those stood, per 100 h", lambda one: _rate(one.neighbours.queues_per_100_hours, 1)),
     ("teleports of theirs, per 100 h", lambda one: _rate(one.neighbours.teleports_per_100_hours, 1)),
 )
 
