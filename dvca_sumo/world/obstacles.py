@@ -13,6 +13,8 @@ from dvca_sumo.truth import ObjectsTruth
 
 Box = tuple[float, float, float, float, float]
 
+_LONGEST = 50.0  # [m] of a box: who is placed by its middle would else begin where nobody looks for it
+
 
 class Obstacles(msgspec.Struct, frozen=True):
     """The static bodies of a scenario."""
@@ -29,7 +31,7 @@ def box_of_poi(position: tuple[float, float], heading: float, width: float, heig
 def boxes_of_polygon(shape: Sequence[tuple[float, float]], is_filled: bool, line_width: float) -> list[Box]:  # noqa: FBT001
     """A polygon's body as boxes: a filled one is its smallest rectangle, a line one box a segment.
 
-    A filled one without an area is a line.
+    A filled one without an area is a line. Boxes that would be very long are several, end to end.
     """
     rectangle = shapely.MultiPoint(shape).minimum_rotated_rectangle
     if is_filled and rectangle.area > 0.0:
@@ -37,13 +39,25 @@ def boxes_of_polygon(shape: Sequence[tuple[float, float]], is_filled: bool, line
         along, across = corners[1] - corners[0], corners[2] - corners[1]
         centre = corners[:4].mean(axis=0)
         heading = math.atan2(along[1], along[0])
-        return [(centre[0], centre[1], heading, float(np.hypot(*along)), float(np.hypot(*across)))]
+        return _parts((centre[0], centre[1], heading, float(np.hypot(*along)), float(np.hypot(*across))))
     boxes: list[Box] = []
     for (x0, y0), (x1, y1) in itertools.pairwise(shape):
         length = math.hypot(x1 - x0, y1 - y0)
         if length > 0.0:
-            boxes.append(((x0 + x1) / 2.0, (y0 + y1) / 2.0, math.atan2(y1 - y0, x1 - x0), length, line_width))
+            boxes += _parts(((x0 + x1) / 2.0, (y0 + y1) / 2.0, math.atan2(y1 - y0, x1 - x0), length, line_width))
     return boxes
+
+
+def _parts(box: Box) -> list[Box]:
+    x, y, heading, length, width = box
+    if length < width:
+        heading, length, width = heading + 0.5 * math.pi, width, length
+    count = max(math.ceil(length / _LONGEST), 1)
+    if count == 1:
+        return [box]
+    part = length / count
+    along = [part * (number - 0.5 * (count - 1)) for number in range(count)]
+    return [(x + way * math.cos(heading), y + way * math.sin(heading), heading, part, width) for way in along]
 
 
 def joined(moving: ObjectsTruth, obstacles: Obstacles, centre: tuple[float, float], radius: float) -> ObjectsTruth:

@@ -35,6 +35,20 @@ def test_a_line_is_one_box_a_segment() -> None:
     assert second == (10.0, 3.0, math.pi / 2, 6.0, 0.5)
 
 
+@pytest.mark.parametrize("is_filled", [True, False])
+def test_what_is_very_long_is_several_boxes_end_to_end(*, is_filled: bool) -> None:
+    """Who comes to a wall looks for it where its near end is, and places bodies by their middles."""
+    outline = [(0.0, 10.0), (0.4, 10.0), (0.4, 310.0), (0.0, 310.0)]
+    boxes = np.array(boxes_of_polygon(outline if is_filled else [(0.2, 10.0), (0.2, 310.0)], is_filled, 0.4))
+    assert boxes[:, 3].max() <= 50.0
+    np.testing.assert_allclose(boxes[:, [0, 4]], np.tile([0.2, 0.4], (len(boxes), 1)), atol=1e-9)
+    np.testing.assert_allclose(np.cos(boxes[:, 2]), 0.0, atol=1e-9)
+    boxes = boxes[boxes[:, 1].argsort()]
+    begins, ends = boxes[:, 1] - 0.5 * boxes[:, 3], boxes[:, 1] + 0.5 * boxes[:, 3]
+    assert (begins[0], ends[-1]) == pytest.approx((10.0, 310.0))
+    np.testing.assert_allclose(begins[1:], ends[:-1])
+
+
 @pytest.mark.parametrize("shape", [[(0.0, 0.0), (4.0, 0.0)], [(0.0, 0.0), (3.0, 0.0), (4.0, 0.0)]])
 def test_a_filled_polygon_without_an_area_is_a_line(shape: list[tuple[float, float]]) -> None:
     boxes = boxes_of_polygon(shape, is_filled=True, line_width=0.2)
