@@ -84,7 +84,8 @@ class LaneChanger:
         target = self._lane
         # A change begun in the other direction swings out far before it turns round.
         is_going_back = self._target == self._lane and abs(aside) > ARRIVED and speed > LAST_SPEED
-        waits = is_going_back or is_at_junction(change, window, speed, self._shape, self._config)
+        is_kept = not has_to and is_at_junction(change, window, speed, self._shape, self._config)
+        waits = is_going_back or is_kept
         while target < last and (target < self._target or not waits):
             present = Urgency.PRESSED if has_to or target < self._target else urgency
             if not self._gaps.is_free(occupied[target + 1], change, window, speed, present):

@@ -89,7 +89,7 @@ class Passing:
             )
             is_pulling_out = target == _BESIDE != self._target
             may_begin = is_begun or (
-                (is_under_way or not is_at_junction(way, window, speed, shape, config))
+                (urgency is Urgency.PRESSED or not is_at_junction(way, window, speed, shape, config))
                 and self._gaps.is_free(occupied[target], way, window, speed, urgency)
                 and (not is_pulling_out or self._gaps.is_in_sight(occupied[_OWN], occupied[_BESIDE], wanted, speed))
             )

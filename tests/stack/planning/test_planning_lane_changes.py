@@ -110,6 +110,18 @@ def test_when_the_queue_drives_off_it_changes_from_standstill() -> None:
     assert_drivable(driven)
 
 
+def test_where_it_has_to_change_it_does_though_that_is_on_a_junction() -> None:
+    queue = [car(100 + row, 420.0 - 7.0 * row, WIDTH, speed=4.0, leaves=40.0) for row in range(60)]
+    route = crossing_over()
+    (change,) = route.lane_changes
+    on_junction = msgspec.structs.replace(change, junctions=((LATEST - 25.0, LATEST - 5.0),))
+    driven = drive(msgspec.structs.replace(route, lane_changes=(on_junction,)), 190.0, speed=10.0, actors=queue)
+    assert "wait to change lanes" in driven.decisions
+    assert lane_at(driven, LATEST + 50.0) == pytest.approx(1.0, abs=0.1)
+    assert driven.fronts[-1] > LATEST + 100.0
+    assert driven.clearances.min() > 0.5
+
+
 def test_over_two_lanes_it_waits_on_the_middle_one() -> None:
     driven = drive(crossing_over(2), 45.0, speed=13.0, actors=[car(7, 7.0, 2.0 * WIDTH, speed=12.0)])
     assert len(fronts_on(driven, 1)) > 20

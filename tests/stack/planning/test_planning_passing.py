@@ -72,6 +72,24 @@ def test_a_queue_that_may_be_for_where_the_ego_goes_is_joined() -> None:
     assert lanes(drive(beside(leads_on=False), 60.0, speed=13.0, actors=queue(1.0))) == [0]
 
 
+def test_where_it_has_to_come_back_it_does_though_that_is_on_a_junction() -> None:
+    """A dense platoon keeps it from coming back before; when that has gone by, nobody is in its way."""
+    ahead, behind = (
+        [car(track, x, speed=8.6) for track, x in rows] for rows in (_platoon(35.0, 110), _platoon(-9.0, 20, -1))
+    )
+    route = beside(leads_on=False, halts=((END - 20.0, END - 5.0),))
+    driven = drive(route, 120.0, speed=8.6, station=10.0, actors=[*ahead, *behind])
+    assert "wait to change lanes" in driven.decisions
+    assert lanes(driven) == [0, 1, 0]
+    assert driven.fronts[-1] > END + 100.0
+    assert driven.clearances.min() > 1.0
+
+
+def _platoon(begin: float, count: int, side: int = 1) -> list[tuple[int, float]]:
+    """Tracks and places [m] of cars 7 m from nose to nose."""
+    return [(side * (1000 + row), begin + side * 7.0 * row) for row in range(count)]
+
+
 def test_behind_a_queue_that_may_be_for_where_the_ego_goes_it_comes_back() -> None:
     """Those whom it is about to pass come up to the end of one."""
     slow = [car(7 + row, 80.0 + 50.0 * row, speed=8.5, stays_from=(318.0 - 42.0 * row) / 8.5) for row in range(1, 4)]
