@@ -124,7 +124,7 @@ class Planner:
         if choice.keeping is not None:
             window = window.moved(choice.keeping.offsets, choice.keeping.begin, choice.keeping.width)
             offset -= float(choice.keeping.offsets[BEHIND])
-        scene = scene_in(window, predicted, time, stood, config)
+        scene = scene_in(window, predicted, time, stood, self._route.overpasses, config)
         nose = station if config.lines_at_rear_axle else station + shape.front
         views = self._junctions.step(time, nose, station - shape.rear_overhang, start.speed, signals, predicted.objects)
         lateral = lateral_start(start, window, offset)

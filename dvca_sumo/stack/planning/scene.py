@@ -1,11 +1,12 @@
 """Predicted objects in the coordinates of the window: where each may be, and when."""
 
-from collections.abc import Container
+from collections.abc import Container, Mapping, Sequence
 
 import msgspec
 import numpy as np
 
 from dvca_sumo.messages import PREDICTION_TIMES, Flags, Floats, Integers, ObjectClass, PredictedObjects
+from dvca_sumo.roadmap.route import Overpass
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.reference import BEHIND, Window
 
@@ -14,6 +15,7 @@ IN_LANE = 1.2  # [m] vehicles whose middle is this near the middle of a lane are
 ALONG = 0.5  # cosine of the largest angle (60 degrees) to a lane or path at which someone drives along it, not across
 SOON = int(np.searchsorted(PREDICTION_TIMES, 1.0))  # far enough to tell going from staying, too near for a guess
 SOON_TIME = float(PREDICTION_TIMES[SOON])  # [s]
+BRIDGE = 20.0  # [m] of path under a bridge, before and after the middle of a lane on it
 _SPARSE = 4  # every so many times of a hypothesis do to bound it
 _FEW = 8  # hypotheses are placed in less time than it takes to find out which are far away
 _AROUND = 6.0  # [m] beyond the window's bounding box, hypotheses are left out
@@ -45,7 +47,7 @@ class Scene(msgspec.Struct, frozen=True, eq=False):
     classes: Integers  # (n,)
     boxes: Floats  # (n, 5) as in `TrackedObjects`
     speeds: Floats  # (n,) [m/s]
-    is_standing: Flags  # (n,) not predicted to go anywhere
+    is_standing: Flags  # (n,) not predicted to go anywhere, and on the level of the ego
     now: Extents  # (n,)
     rows_now: Integers  # (3, n) of the window
     times: Floats  # (t,) [s] from the present
@@ -60,13 +62,18 @@ class Scene(msgspec.Struct, frozen=True, eq=False):
 
 
 def scene_in(
-    window: Window, predicted: PredictedObjects, time: float, stood: Container[int], config: PlanningConfig
+    window: Window,
+    predicted: PredictedObjects,
+    time: float,
+    stood: Container[int],
+    overpasses: Sequence[Overpass],
+    config: PlanningConfig,
 ) -> Scene:
     """All objects with their futures at `time` [s] and after.
 
     `stood`: the tracks that stood in the last cycle. An object stands that is predicted to stay, or of
     which nothing is predicted. It gets the one future of staying: its heading is no intention, and its
-    noise no motion.
+    noise no motion. On another of the `overpasses` of the route it gets none.
     """
     objects = predicted.objects
     speeds = np.hypot(objects.velocities[:, 0], objects.velocities[:, 1])
@@ -78,13 +85,15 @@ def scene_in(
     stays = _foreseen_speeds(predicted) < np.array(slowest)[predicted.owners]
     standing[predicted.owners[counts & ~stays]] = False
     counts &= ~standing[predicted.owners]
+    on = dict(zip(predicted.owners.tolist(), predicted.lanes, strict=True))
+    if overpasses:
+        standing[_on_overpasses(window, objects.boxes, on, overpasses)] = False
     rows, still = counts.nonzero()[0], standing.nonzero()[0]
     poses = predicted.poses.take(rows, axis=0)
     if len(rows) > _FEW:
         around = _is_around(window, poses)
         rows, poses = rows[around], poses[around]
     owners = predicted.owners[rows]
-    on = dict(zip(predicted.owners.tolist(), predicted.lanes, strict=True))
     now, futures, rows_now, rows_then = _extents(window, objects.boxes, poses, owners, still)
     owners = np.concatenate((owners, still))
     probabilities = np.ones(len(owners))
@@ -116,6 +125,22 @@ def _slowest_moving(
     people = (config.lingering_speed, config.standing_speed)
     others = (config.standing_speed, config.moving_speed)
     return [(people if person else others)[track in stood] for track, person in zip(ids, is_person, strict=True)]
+
+
+def _on_overpasses(
+    window: Window, boxes: Floats, on: Mapping[int, tuple[str, ...]], overpasses: Sequence[Overpass]
+) -> list[int]:
+    """Which of the boxes (n, 5) are where the lane that they are `on` passes over or under the window's line."""
+    found = []
+    for overpass in overpasses:
+        rows = [row for row, lanes in on.items() if overpass.lane in lanes]
+        if rows:
+            stations, _, _ = window.project(boxes[rows, :2])
+            ahead = overpass.station - window.station
+            found += [
+                row for row, station in zip(rows, stations.tolist(), strict=True) if abs(station - ahead) <= BRIDGE
+            ]
+    return found
 
 
 def _foreseen_speeds(predicted: PredictedObjects) -> Floats:

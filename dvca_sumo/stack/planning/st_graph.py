@@ -9,7 +9,7 @@ from dvca_sumo.roadmap.route import Crossing, Overpass, Route
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Path
 from dvca_sumo.stack.planning.reference import BEHIND, Window
-from dvca_sumo.stack.planning.scene import ALONG, Scene
+from dvca_sumo.stack.planning.scene import ALONG, BRIDGE, Scene
 from dvca_sumo.stack.planning.speed import STEP_TIMES, Leader
 
 PRESENT = 0.3  # [s] what occupies the path within this time is there already
@@ -24,7 +24,6 @@ _DOUBT = 1.0  # [m] gaps to what stands, and overlaps, up to which its outline i
 _PARTS = 12  # of each side of an outline
 _OFF_LANE = 0.5  # [m] of the body beyond the edge of its lane, by the line, not by what it swerves for
 _GRAZING = 0.6  # [m] of overlap of who moves and the body, up to which the outline is looked at
-_BRIDGE = 20.0  # [m] of path under a bridge, before and after the middle of a lane on it
 
 
 class Graph(msgspec.Struct, frozen=True, eq=False):
@@ -153,10 +152,10 @@ def _closely(boxes: Floats, window: Window, path: Path) -> tuple[Floats, Floats]
 def _pass_over(occupied: Flags, overpass: Overpass, scene: Scene, window: Window) -> None:
     """Free the path of those who get to it by a lane that passes over or under it."""
     ahead = overpass.station - window.station
-    if not -_BRIDGE < ahead < window.rows.shape[1] - BEHIND + _BRIDGE:
+    if not -BRIDGE < ahead < window.rows.shape[1] - BEHIND + BRIDGE:
         return
     rows = [row for row, lanes in enumerate(scene.lanes) if overpass.lane in lanes]
-    occupied[rows] &= np.abs(scene.futures.stations[rows] - ahead) > _BRIDGE
+    occupied[rows] &= np.abs(scene.futures.stations[rows] - ahead) > BRIDGE
 
 
 def _has_lane_room(scene: Scene, window: Window, shape: VehicleShape) -> Flags:

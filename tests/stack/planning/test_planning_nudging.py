@@ -547,7 +547,7 @@ def test_a_move_for_one_that_it_goes_by_already_is_not_cut_short_when_that_one_s
         aside = 2.3 - (nearer if cycle >= 35 else 0.0)
         x, y, heading = route.line.poses(np.array([66.0]), np.array([aside]))[0].tolist()
         time, beside = 0.1 * cycle, car(3, x, y, heading=heading + math.pi)
-        scene = scene_in(window, predicted([beside], time), time, decider.stood, config)
+        scene = scene_in(window, predicted([beside], time), time, decider.stood, (), config)
         nudges, _ = decider.step(Situation(time, 2.0, Lateral(0.0, 0.0, 0.0), window, scene, []))
         begins += [nudge.plateau.begin for nudge in nudges]
     assert begins
@@ -691,7 +691,7 @@ def test_nobody_beside_a_bend_is_taken_to_stand_clear_who_does_not(radius: float
     headings = along + random.normal(0.0, 0.4, 200)
     spots = zip(x - besides * np.sin(along), y + besides * np.cos(along), headings, strict=True)
     actors = [car(track, east, north, heading=turned, size=size) for track, (east, north, turned) in enumerate(spots)]
-    scene = scene_in(window, predicted(actors, 0.0), 0.0, (), config)
+    scene = scene_in(window, predicted(actors, 0.0), 0.0, (), (), config)
     found, _ = blockers(scene, window, 5.0, (), SHAPE, config)
     around, offsets, _ = window.project(outlines(scene.boxes, 4).reshape(-1, 2))
     rows = window.index(around)

@@ -51,5 +51,5 @@ def test_who_walks_on_slowly_has_left_where_it_stood_and_is_where_it_is_seen() -
 def test_who_slows_down_on_foot_may_walk_on(stood: tuple[int, ...], speed: float, *, stands: bool) -> None:
     """Whoever has stood is not told by the noise of a tracker to walk."""
     window = Reference(road(), SHAPE, PlanningConfig()).window(100.0, 50.0)
-    scene = scene_in(window, predicted([person(3, 120.0, 2.5, speed=speed)], 0.0), 0.0, stood, PlanningConfig())
+    scene = scene_in(window, predicted([person(3, 120.0, 2.5, speed=speed)], 0.0), 0.0, stood, (), PlanningConfig())
     assert scene.is_standing.tolist() == [stands]

@@ -975,6 +975,14 @@ def test_who_comes_by_a_bridge_is_no_reason_to_slow_down(lane: str) -> None:
     assert (driven.speeds.min() > 12.9) == (lane == "bridge_0")
 
 
+@pytest.mark.parametrize("lane", ["bridge_0", "side_0"])
+def test_nobody_waits_or_swerves_below_a_bridge_for_who_stands_on_it(lane: str) -> None:
+    queue = [car(track, 100.0, 7.0 * track - 13.5, heading=math.pi / 2.0, lanes=(lane,)) for track in (1, 2, 3)]
+    driven = drive(road(overpasses=[Overpass("bridge_0", 100.0, (100.0, 0.0))]), 12.0, speed=12.0, actors=queue)
+    is_free = driven.speeds.min() > 11.9 and np.abs(driven.states[:, 2]).max() < 0.05
+    assert is_free == (lane == "bridge_0")
+
+
 @pytest.mark.parametrize("speed", [6.0, 8.0])
 def test_where_its_line_comes_back_to_the_lane_the_ego_lets_those_on_the_lane_go_first(speed: float) -> None:
     """After a turn that swings out beside the lane, it is the ego that cuts in, whoever changes place to its line."""
