@@ -15,7 +15,7 @@ from dvca_sumo.stack.planning.speed import HARD_GAP, STEP_TIMES, Profile, Stop
 from dvca_sumo.stack.planning.st_graph import PRESENT, Graph
 
 _SPEEDS_UP = 0.4  # [m/s] faster over the next second than now
-_CUTS_IN = 0.5  # [m] moved sideways before the meeting: the other comes into our lane, not we into theirs
+_CUTS_IN = 0.5  # [m] sideways before the meeting: the other comes into our lane, not we into theirs
 _STAYS = 2  # columns of the graph, after which somebody is on the path to drive along it
 _STILL_TO_CROSS = 2  # lanes of a person's future: a pavement, then a crossing
 _LEAST_ROOM = 0.1  # [m]
@@ -222,9 +222,14 @@ class Meetings:
         return _Turn.CUT_IN if self._cuts_in(row, graph) else _Turn.THEIRS
 
     def _cuts_in(self, row: int, graph: Graph) -> bool:
-        futures, first = graph.scene.futures, graph.first[row]
+        """Whether the other moves sideways over to the line, and not the line, in a bend, over to it."""
+        scene, window, first = graph.scene, graph.window, graph.first[row]
+        futures, here = scene.futures, scene.rows[0, row, 0]
         is_along = futures.directions[row, 0] > ALONG and futures.directions[row, first] > ALONG
-        return bool(is_along and abs(futures.offsets[row, first] - futures.offsets[row, 0]) > _CUTS_IN)
+        if not is_along or abs(futures.offsets[row, first] - futures.offsets[row, 0]) <= _CUTS_IN:
+            return False
+        east, north = scene.poses[row, first, :2] - scene.poses[row, 0, :2]
+        return bool(abs(north * window.cosines[here] - east * window.sines[here]) > _CUTS_IN)
 
     def _cut_in(self, row: int, graph: Graph, profile: Profile) -> Demand | None:
         """Who cuts in with its nose ahead of ours becomes the leader; who does not has to see to it."""

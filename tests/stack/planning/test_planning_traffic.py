@@ -1022,3 +1022,11 @@ def test_a_long_vehicle_that_comes_aslant_into_the_side_of_an_ego_at_rest_is_not
     bus = car(3, x, y, heading=heading, speed=3.5, size=(2.0 * half, 2.5), lanes=("aside_0",))
     driven = drive(road(), 0.6, station=60.0, actors=[bus])
     assert driven.speeds.max() < 0.05
+
+
+@pytest.mark.parametrize("lanes", [(), ("ego_0",)])
+def test_who_drives_straight_on_where_the_ego_turns_does_not_cut_in(lanes: tuple[str, ...]) -> None:
+    """Inside its bend: it is the ego that comes into the other's way, and has to see to it."""
+    other = car(3, 35.2, 3.9, heading=0.02, speed=2.5, size=(5.0, 1.8), lanes=lanes)
+    driven = drive(road(curve_points(12.0, before=40.0, after=60.0)), 9.0, speed=6.0, station=10.0, actors=[other])
+    assert driven.clearances.min() > 0.3
