@@ -3,9 +3,9 @@
 import msgspec
 import numpy as np
 
-from dvca_sumo.geometry.boxes import outlines
-from dvca_sumo.messages import PREDICTION_STEP, PREDICTION_TIMES, Flags, Floats, Integers, ObjectClass, VehicleShape
+from dvca_sumo.messages import PREDICTION_STEP, PREDICTION_TIMES, Flags, Floats, ObjectClass, VehicleShape
 from dvca_sumo.roadmap.route import Crossing, Overpass, Route
+from dvca_sumo.stack.planning.closeness import hidden_depths, moved_beside, outlined, stood_beside
 from dvca_sumo.stack.planning.config import PlanningConfig
 from dvca_sumo.stack.planning.path import Path
 from dvca_sumo.stack.planning.reference import BEHIND, Window
@@ -20,8 +20,6 @@ _WALKS_ACROSS = 0.3  # [m/s] sideways
 _COLUMNS = np.arange(len(PREDICTION_TIMES))
 _NEVER = 1e4  # [m] for places where there is no leader
 _LANE_ROOM = 0.3  # [m] of lane beside the ego's width that is enough for `trusts_lane_room`
-_DOUBT = 1.0  # [m] gaps to what stands, and overlaps, up to which its outline is looked at
-_PARTS = 12  # of each side of an outline
 _OFF_LANE = 0.5  # [m] of the body beyond the edge of its lane, by the line, not by what it swerves for
 _GRAZING = 0.6  # [m] of overlap of who moves and the body, up to which the outline is looked at
 
@@ -65,7 +63,7 @@ class Graph(msgspec.Struct, frozen=True, eq=False):
         scene, columns = self.scene, self.occupied[row].nonzero()[0]
         boxes = np.tile(scene.boxes[scene.owners[row]], (len(columns), 1))
         boxes[:, :3] = scene.poses[row, columns]
-        stations, gaps = _closely(boxes, self.window, self.path)
+        stations, gaps = outlined(boxes, self.window, self.path)
         count, is_there = len(self.path.arcs), stations > -self.rear_overhang
         nearest = [stations[(gaps < margin) & is_there].min(initial=count) for margin in (self.margins[row], 0.0)]
         within, touching = np.interp(nearest, np.arange(count), self.path.arcs).tolist()
@@ -87,14 +85,18 @@ def graph_of(
     """
     futures, rows = scene.futures, scene.rows
     gaps = futures.gaps(np.maximum.reduce(path.left.take(rows)), np.minimum.reduce(path.right.take(rows)))
-    _look_closely(gaps[scene.moving :], scene, window, path)
-    count = len(path.arcs)
+    count, still = len(path.arcs), slice(scene.moving, None)
+    hidden = hidden_depths(scene, window)
+    beyond, begins, ends = stood_beside(gaps[still], hidden[still], scene, window, path, config)
     stretch = np.zeros(BEHIND + count)
     stretch[BEHIND:] = path.arcs - np.arange(count, dtype=np.float64)
     centres = futures.stations + stretch.take(rows[0])
     low, high = centres - futures.half_lengths, centres + futures.half_lengths
+    low[beyond], high[beyond] = np.minimum(low[beyond], begins), np.maximum(high[beyond], ends)
     margins = _margins(scene, gaps, window, route.crossings, speed, config)
     occupied = gaps < margins[:, None]
+    if hidden[: scene.moving].any():
+        occupied[: scene.moving] |= gaps[: scene.moving] < (margins + hidden)[: scene.moving, None]
     _let_leave(occupied, scene, gaps, config)
     occupied &= (high > -shape.rear_overhang) & (futures.stations < count - 2)
     for overpass in route.overpasses:
@@ -103,50 +105,18 @@ def graph_of(
     begins, ends = low, high
     if grazing[0].size:
         begins, ends = low.copy(), high.copy()
-        nearest, begins[grazing], ends[grazing] = _beside(scene, window, path, margins[grazing[0]], *grazing)
+        nearest, begins[grazing], ends[grazing] = moved_beside(scene, window, path, margins[grazing[0]], *grazing)
+        out = tuple(each[gaps[grazing] >= margins[grazing[0]]] for each in grazing)
+        low[out], high[out] = begins[out], ends[out]
         gaps[grazing] = nearest
         occupied[grazing] = nearest < margins[grazing[0]]
     if config.trusts_lane_room:
-        occupied[scene.moving :][_has_lane_room(scene, window, shape)] = False
+        occupied[still][_has_lane_room(scene, window, shape)] = False
     last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)
     first = occupied.argmax(axis=1).tolist()
     return Graph(
         window, path, scene, occupied, margins, gaps, low, high, begins, ends, first, last.tolist(), shape.rear_overhang
     )
-
-
-def _look_closely(gaps: Floats, scene: Scene, window: Window, path: Path) -> None:
-    """Correct the gaps (s, t) to those who stand aslant, or beside a bend: extents are more than they are."""
-    doubtful = (np.abs(gaps[:, 0]) < _DOUBT).nonzero()[0]
-    if not doubtful.size:
-        return
-    _, beside = _closely(scene.boxes[scene.owners[scene.moving + doubtful]], window, path)
-    gaps[doubtful] = beside.reshape(len(doubtful), -1).min(axis=1)[:, None]
-
-
-def _beside(
-    scene: Scene, window: Window, path: Path, margins: Floats, rows: Integers, columns: Integers
-) -> tuple[Floats, Floats, Floats]:
-    """Those who move, at moments of futures (n,), by their outlines: extents are more, in a bend and of who is aslant.
-
-    Returns:
-        Gaps sideways; the arcs from which, and up to which, they are nearer than `margins` (n,). All (n,) [m].
-    """
-    boxes = scene.boxes[scene.owners[rows]]
-    boxes[:, :3] = scene.poses[rows, columns]
-    stations, gaps = (points.reshape(len(rows), -1) for points in _closely(boxes, window, path))
-    is_near = gaps < margins[:, None]
-    begins, ends = np.where(is_near, stations, np.inf).min(axis=1), np.where(is_near, stations, -np.inf).max(axis=1)
-    metres = np.arange(-BEHIND, len(path.arcs), dtype=np.float64)
-    arcs = np.concatenate((metres[:BEHIND], path.arcs))
-    return gaps.min(axis=1), np.interp(begins, metres, arcs), np.interp(ends, metres, arcs)
-
-
-def _closely(boxes: Floats, window: Window, path: Path) -> tuple[Floats, Floats]:
-    """Stations of points all around boxes (n, 5), box by box, and how far each is beside the body there [m]."""
-    stations, offsets, _ = window.project(outlines(boxes, _PARTS).reshape(-1, 2))
-    rows = window.index(stations)
-    return stations, np.maximum(offsets - path.left.take(rows), path.right.take(rows) - offsets)
 
 
 def _pass_over(occupied: Flags, overpass: Overpass, scene: Scene, window: Window) -> None:

@@ -1030,3 +1030,28 @@ def test_who_drives_straight_on_where_the_ego_turns_does_not_cut_in(lanes: tuple
     other = car(3, 35.2, 3.9, heading=0.02, speed=2.5, size=(5.0, 1.8), lanes=lanes)
     driven = drive(road(curve_points(12.0, before=40.0, after=60.0)), 9.0, speed=6.0, station=10.0, actors=[other])
     assert driven.clearances.min() > 0.3
+
+
+@pytest.mark.parametrize(
+    ("radius", "x", "y", "heading", "length"),
+    [
+        (9.0, 48.3, 9.1, 1.55, 14.0),
+        (16.0, 45.0, 4.2, 3.13, 14.0),
+        (9.0, 44.9, 7.9, -0.01, 18.0),
+        (12.0, 49.0, 12.3, 1.39, 30.0),
+    ],
+)
+def test_the_end_of_a_long_body_that_stands_inside_a_bend_is_stopped_for(
+    radius: float, x: float, y: float, heading: float, length: float
+) -> None:
+    """It lies across the bend, its middle beside it."""
+    bus = car(3, x, y, heading=heading, size=(length, 2.5))
+    driven = drive(road(curve_points(radius, before=40.0, after=60.0)), 16.0, speed=6.0, station=10.0, actors=[bus])
+    assert driven.decisions[-1] == "stop behind 3"
+    assert driven.clearances.min() > 1.0
+
+
+def test_the_end_of_a_long_body_that_comes_into_a_bend_is_let_pass() -> None:
+    bus = car(3, 52.0, 20.0, heading=-1.52, speed=0.9, size=(18.0, 2.5), lanes=("side_0",))
+    driven = drive(road(curve_points(12.0, before=40.0, after=60.0)), 9.0, speed=6.0, station=10.0, actors=[bus])
+    assert driven.clearances.min() > 0.5
