@@ -16,6 +16,7 @@ _STRAIGHT_WEIGHT = 3.0  # going straight against turning
 _TURNAROUND = 2.6  # [rad]
 _TURNAROUND_WEIGHT = 0.1
 _LEAST = 0.05  # probability of a way at a fork that is looked at in any case
+_MOST = 2000  # ends looked at: among short edges there are more than can be
 
 
 class Traffic(enum.IntEnum):
@@ -81,16 +82,25 @@ class Continuations:
         return end
 
     def _likeliest(self, begin: _End, length: float, count: int) -> list[tuple[float, tuple[str, ...]]]:
-        """Best-first search: the first ones to reach `length` [m] are the likeliest."""
+        """Best-first search: the first ones to reach `length` [m] are the likeliest.
+
+        After `_MOST` steps the likeliest so far go on by the likeliest way at each fork.
+        """
         likely: list[tuple[float, tuple[str, ...]]] = []
         open_ends = [(-begin.probability, begin)]
+        steps = 0
         while open_ends and len(likely) < count:
+            if steps == _MOST:
+                open_ends = heapq.nsmallest(count - len(likely), open_ends)
             _, end = heapq.heappop(open_ends)
             onward = self._onward(end) if end.covered < length else []
             if not onward:
                 likely.append((end.probability, end.lanes))
+            elif steps >= _MOST:
+                onward = [max(onward, key=lambda further: further.probability)]
             for further in onward:
                 heapq.heappush(open_ends, (-further.probability, further))
+            steps += 1
         return likely
 
     def _onward(self, end: _End) -> list[_End]:
