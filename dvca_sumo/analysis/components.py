@@ -71,7 +71,10 @@ def responsible_component(dtest: Dtest, record: Record, time: float) -> Componen
 
 
 def mark_before(record: Record, component: Component, time: float, back: float | None) -> MessageMark | None:
-    """The first message of `component` from `back` [s] before `time` on; None where that is its first of all."""
+    """The first message of `component` from `back` [s] before `time` on; None where that is its first of all.
+
+    A component that made any must have made one from then on.
+    """
     if back is None:
         return None
     index = record.first_at(component, time - back)

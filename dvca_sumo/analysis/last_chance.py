@@ -99,6 +99,8 @@ def _do_their_best(dtest: Dtest, record: Record, chance: float) -> bool:
 
 
 def _is_enough(dtest: Dtest, record: Record, component: Component, since: float, time: float) -> bool:
+    if record.first_at(component, since) == len(record.executions[component]):
+        return False  # the drive ended before, and nothing would be replaced
     mark = mark_before(record, component, since, 0.0)
     if mark is not None and mark.time > time:
         return False

@@ -1,8 +1,10 @@
 """Several components are enough: the last that could have prevented it is responsible, upstream among equals."""
 
+import math
+
 import pytest
 
-from analysis.scenes import START, FakeEngine, answering, asking, collision, drive, ideals
+from analysis.scenes import START, FakeEngine, answering, asking, breach, collision, drive, ideals
 from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.analysis.components import ComponentAnswer, responsible_component
 from dvca_sumo.analysis.dtest import Dtest
@@ -12,6 +14,7 @@ from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.messages import Component
 from dvca_sumo.run import Task
+from dvca_sumo.violations import Category
 
 LOCALIZATION, PERCEPTION, PREDICTION, CONTROL = (
     Component.LOCALIZATION,
@@ -134,6 +137,20 @@ def test_of_control_it_is_asked_however_late_its_chance_was(*, is_enough_further
     component, messages = decisive(dtest, DRIVE, answer, TIME, TIME + 4.0, is_exact=True)
     assert component is CONTROL
     assert is_by_luck(dtest, DRIVE, component, messages, TIME) is not is_enough_further_back
+
+
+@pytest.mark.parametrize("is_exact", [True, False])
+@pytest.mark.parametrize("before", [0.0, 0.1, 0.4, 1.0])
+def test_of_a_drive_that_ends_with_its_violation_nothing_later_is_asked(before: float, *, is_exact: bool) -> None:
+    """With jitter by as much as the states cannot tell: from standstill to the end they are one."""
+    violation = breach("no_progress", Category.MISSION, TIME)
+    record = drive(duration=TIME - START, violations=(violation,))
+    record.stations = [min(station, 100.0) for station in record.stations]
+    enough = {one: record.first_at(one, TIME - before - CYCLE) for one in (PERCEPTION, PREDICTION)}
+    jitters = (None,) if is_exact else (0, 1, 2)
+    dtest = asking(FakeEngine(answering(record, enough)), jitters=jitters, is_mission=True)
+    answer = responsible_component(dtest, record, TIME)
+    assert decisive(dtest, record, answer, TIME, math.inf, is_exact=is_exact)[0] is PERCEPTION
 
 
 def test_the_latency_is_that_of_components_that_run_ten_times_a_second() -> None:
