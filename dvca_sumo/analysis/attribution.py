@@ -16,10 +16,11 @@ from dvca_sumo.analysis.components import (
     named_instead,
     planning_named_instead,
     responsible_component,
+    undecided,
 )
 from dvca_sumo.analysis.differences import Difference, differences
 from dvca_sumo.analysis.dtest import Dtest, Probe, Question, Setting
-from dvca_sumo.analysis.last_chance import decisive, is_by_luck
+from dvca_sumo.analysis.last_chance import UndecidedError, decisive, is_by_luck
 from dvca_sumo.analysis.messages import MessageAnswer
 from dvca_sumo.analysis.specification import PlanningFinding, first_unusable_plan, first_violating_plan
 from dvca_sumo.analysis.violating import principal
@@ -242,8 +243,13 @@ def _decided(found: Attribution, dtest: Dtest, engine: Engine, *, is_exact: bool
     answer, violation, record = found.components, found.violation, found.record
     assert answer is not None  # the caller has it
     assert violation is not None
-    component, messages = decisive(dtest, record, answer, violation.time, found.until, is_exact=is_exact)
-    if is_by_luck(dtest, record, component, messages, violation.time):
+    try:
+        component, messages = decisive(dtest, record, answer, violation.time, found.until, is_exact=is_exact)
+        has_luck = is_by_luck(dtest, record, component, messages, violation.time)
+    except UndecidedError as error:
+        answer = undecided(answer, str(error))
+        return replace(found, verdict=answer.verdict, reason=answer.reason, components=answer)
+    if has_luck:
         answer = concluded(Outcome.VIOLATES, answer.singles, answer.since)
         reason = f"ideal {component} prevents it by luck: the violation stays with all four ideal from further back"
         answer = replace(answer, reason=reason)

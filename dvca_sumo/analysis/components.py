@@ -191,3 +191,11 @@ def planning_named_instead(answer: ComponentAnswer) -> ComponentAnswer:
         alternatives=enough,
         reason=f"ideal {', '.join(enough)} prevents it, but planning put out what cannot be followed",
     )
+
+
+def undecided(answer: ComponentAnswer, reason: str) -> ComponentAnswer:
+    """The same vector, where a run that decides between those that are enough could not be told."""
+    enough = tuple(one for one in SUBSTITUTABLE if answer.singles[one] is Outcome.SAFE)
+    return msgspec.structs.replace(
+        answer, verdict=Verdict.UNRESOLVED, component=None, alternatives=enough, reason=reason
+    )

@@ -13,6 +13,8 @@ those, or from further back.
 Where even that lies more than `PROMPT` before the violation, it is asked as well whether all four, ideal
 from the start, prevent it: if not, the violation is planning's, and what helped was luck. Of control it is
 asked in any case, from `FURTHER` before: in the last moment a perfect hand saves a plan that was wrong.
+
+Where one of these questions could not be told, it is left open who is responsible.
 """
 
 from collections.abc import Iterator
@@ -35,6 +37,15 @@ _SENSING = (Component.LOCALIZATION, Component.PERCEPTION)
 _BACK = (0.0, 1.0, 2.0, 4.0)  # [s] further back: that once all goes well may be luck, not that it does so each time
 
 
+class UndecidedError(Exception):
+    """A question that decides who is responsible could not be told."""
+
+    def __init__(self, question: Question) -> None:
+        since = "" if question.since is None else f" from {question.since.time:.2f} s on"
+        said = f"the run with ideal {', '.join(question.ideal)}{since} could not be told"
+        super().__init__(f"{said}, and it decides who is responsible")
+
+
 def decisive(
     dtest: Dtest, record: Record, answer: ComponentAnswer, time: float, until: float, *, is_exact: bool
 ) -> tuple[Component, MessageAnswer]:
@@ -47,44 +58,51 @@ def decisive(
         time: [s] of the violation.
         until: [s] at which a safe run ends.
         is_exact: Whether runs repeat bit for bit.
+
+    Raises:
+        UndecidedError: See there.
     """
     component = answer.component
     assert component is not None  # see above
-    seen = {component}
+    seen = [component]
     while True:
         messages = violation_inducing_message(dtest, record, component, time, until, is_exact=is_exact)
         latency = LATENCY if is_exact else LATENCY_OF_STATES
-        later = _later(dtest, record, answer, component, (messages.last_safe.time, latency), time)
-        rival = next((one for one in later if one not in seen), None)
+        rival = next(_later(dtest, record, answer, seen, (messages.last_safe.time, latency), time), None)
         if rival is None:
             return component, messages
-        seen.add(rival)
+        seen.append(rival)
         component = rival
 
 
 def is_by_luck(dtest: Dtest, record: Record, component: Component, messages: MessageAnswer, time: float) -> bool:
-    """Whether all four, ideal from further back than the last chance of `component`, do not prevent the violation."""
+    """Whether all four, ideal from further back than the last chance of `component`, do not prevent the violation.
+
+    Raises:
+        UndecidedError: See there.
+    """
     is_early = time - messages.last_safe.time > PROMPT
     if not is_early and component is not Component.CONTROL:
         return False
     since = None if is_early else mark_before(record, SUBSTITUTABLE[0], time, FURTHER)
-    return dtest.ask(Question(SUBSTITUTABLE, since)) is Outcome.VIOLATES
+    return not _is_prevented(dtest, Question(SUBSTITUTABLE, since))
 
 
 def _later(
-    dtest: Dtest, record: Record, answer: ComponentAnswer, component: Component, last: tuple[float, float], time: float
+    dtest: Dtest, record: Record, answer: ComponentAnswer, seen: list[Component], last: tuple[float, float], time: float
 ) -> Iterator[Component]:
-    """Components that could have prevented it later than `component`; `last`: its last chance, and the latency [s].
+    """Components not `seen` that could have prevented it later than the last one that was.
 
-    Those upstream count as later up to the latency earlier. One that was not enough from where all were
-    asked is not asked after that again.
+    `last`: its last chance, and the latency [s]. Those upstream count as later up to the latency earlier. One
+    that was not enough from where all were asked is not asked after that again.
     """
-    place, (chance, latency) = SUBSTITUTABLE.index(component), last
-    for other in SUBSTITUTABLE[:place]:
+    component, (chance, latency) = seen[-1], last
+    place = SUBSTITUTABLE.index(component)
+    for other in (one for one in SUBSTITUTABLE[:place] if one not in seen):
         is_open = answer.singles[other] is not Outcome.SAFE and chance - latency < answer.since
         if is_open and _is_enough(dtest, record, other, chance - latency, time):
             yield other
-    for other in SUBSTITUTABLE[place + 1 :]:
+    for other in (one for one in SUBSTITUTABLE[place + 1 :] if one not in seen):
         if answer.singles[other] is not Outcome.SAFE or not _is_enough(dtest, record, other, chance + latency, time):
             continue
         if other not in _SENSING and component in _SENSING and _do_their_best(dtest, record, chance):
@@ -95,7 +113,7 @@ def _later(
 def _do_their_best(dtest: Dtest, record: Record, chance: float) -> bool:
     """Whether the others as they were prevent the violation, given the truth from `chance` [s] on or from before."""
     marks = [mark_before(record, _SENSING[0], chance, back) for back in _BACK]
-    return all(dtest.ask(Question(_SENSING, mark)) is Outcome.SAFE for mark in marks)
+    return all(_is_prevented(dtest, Question(_SENSING, mark)) for mark in marks)
 
 
 def _is_enough(dtest: Dtest, record: Record, component: Component, since: float, time: float) -> bool:
@@ -104,4 +122,11 @@ def _is_enough(dtest: Dtest, record: Record, component: Component, since: float,
     mark = mark_before(record, component, since, 0.0)
     if mark is not None and mark.time > time:
         return False
-    return dtest.ask(Question((component,), mark)) is Outcome.SAFE
+    return _is_prevented(dtest, Question((component,), mark))
+
+
+def _is_prevented(dtest: Dtest, question: Question) -> bool:
+    outcome = dtest.ask(question)
+    if outcome is Outcome.UNRESOLVED:
+        raise UndecidedError(question)
+    return outcome is Outcome.SAFE

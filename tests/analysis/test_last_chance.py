@@ -1,17 +1,30 @@
 """Several components are enough: the last that could have prevented it is responsible, upstream among equals."""
 
 import math
+from collections.abc import Callable
 
 import pytest
 
-from analysis.scenes import START, FakeEngine, answering, asking, breach, collision, drive, ideals
+from analysis.scenes import (
+    CRASHED,
+    START,
+    FakeEngine,
+    answering,
+    asking,
+    attributed,
+    breach,
+    collision,
+    drive,
+    ideals,
+)
 from dvca_sumo.analysis.bisection import Outcome
-from dvca_sumo.analysis.components import ComponentAnswer, responsible_component
+from dvca_sumo.analysis.components import ComponentAnswer, Verdict, responsible_component
 from dvca_sumo.analysis.dtest import Dtest
 from dvca_sumo.analysis.last_chance import FURTHER, LATENCY, PROMPT, decisive, is_by_luck
 from dvca_sumo.analysis.messages import MessageAnswer
 from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Glimpse
+from dvca_sumo.interventions import Ideal
 from dvca_sumo.messages import Component
 from dvca_sumo.run import Task
 from dvca_sumo.violations import Category
@@ -151,6 +164,64 @@ def test_of_a_drive_that_ends_with_its_violation_nothing_later_is_asked(before: 
     dtest = asking(FakeEngine(answering(record, enough)), jitters=jitters, is_mission=True)
     answer = responsible_component(dtest, record, TIME)
     assert decisive(dtest, record, answer, TIME, math.inf, is_exact=is_exact)[0] is PERCEPTION
+
+
+def is_late_perception(substituted: dict[Component, Ideal]) -> bool:
+    return set(substituted) == {PERCEPTION} and 0.7 < back_of(substituted) < 0.95
+
+
+def is_sensing(substituted: dict[Component, Ideal]) -> bool:
+    return set(substituted) == {LOCALIZATION, PERCEPTION}
+
+
+def is_all_of_the_drive(substituted: dict[Component, Ideal]) -> bool:
+    return len(substituted) == 4 and back_of(substituted) == TIME - START
+
+
+def back_of(substituted: dict[Component, Ideal]) -> float:
+    """How long before the violation a substitution begins [s]."""
+    return TIME - START - min(ideal.selection.start for ideal in substituted.values())
+
+
+@pytest.mark.parametrize(
+    ("befores", "crashes", "said"),
+    [
+        ({LOCALIZATION: 0.95, PERCEPTION: 0.4}, is_late_perception, "ideal perception from"),
+        ({PERCEPTION: 0.9, CONTROL: 0.3}, is_sensing, "ideal localization, perception from"),
+        ({LOCALIZATION: PROMPT + 0.5}, is_all_of_the_drive, "prediction, control could not"),
+    ],
+)
+def test_where_a_question_that_decides_could_not_be_told_nobody_is_named(
+    befores: dict[Component, float], crashes: Callable[[dict[Component, Ideal]], bool], said: str
+) -> None:
+    enough = answering(DRIVE, {component: last(component, before) for component, before in befores.items()})
+
+    def answers(task: Task) -> Glimpse | Failure:
+        return CRASHED if ideals(task) and crashes(ideals(task)) else enough(task)
+
+    found = attributed(DRIVE, answers)
+    assert (found.verdict, found.message, found.messages) == (Verdict.UNRESOLVED, None, None)
+    assert said in found.reason
+    assert found.components is not None
+    assert (found.components.verdict, found.components.component) == (Verdict.UNRESOLVED, None)
+    assert set(found.components.alternatives) == set(befores)
+    assert found.components.reason == found.reason
+    assert Outcome.UNRESOLVED in [probe.outcome for probe in found.probes]
+    assert attributed(DRIVE, enough).verdict is Verdict.COMPONENT
+
+
+def test_a_question_on_which_nothing_depends_may_stay_open() -> None:
+    """Of prediction, once perception upstream of it has turned out to be the same chance."""
+    enough = answering(DRIVE, {PERCEPTION: last(PERCEPTION, 1.0 + CYCLE), PREDICTION: last(PREDICTION, 1.0)})
+
+    def answers(task: Task) -> Glimpse | Failure:
+        substituted = ideals(task)
+        return CRASHED if set(substituted) == {PREDICTION} and 0.7 < back_of(substituted) < 0.95 else enough(task)
+
+    found = attributed(DRIVE, answers)
+    assert Outcome.UNRESOLVED in [probe.outcome for probe in found.probes]
+    assert found.components is not None
+    assert found.components.component is PERCEPTION
 
 
 def test_the_latency_is_that_of_components_that_run_ten_times_a_second() -> None:
