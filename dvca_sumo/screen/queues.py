@@ -24,7 +24,7 @@ class Queues:
     """The queues of one simulation, as its egos stand in them."""
 
     def __init__(self, is_stopping: Callable[[str], bool]) -> None:
-        """`is_stopping` says of a vehicle under way whether it makes a stop of its own now."""
+        """`is_stopping` says of a vehicle whether it makes a stop of its own now."""
         self._is_stopping = is_stopping
         self._held: dict[str, bool] = {}  # by ego
 

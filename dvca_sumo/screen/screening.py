@@ -150,6 +150,7 @@ class _Work:
         while batches:
             again: list[list[Trip]] = []
             crowded_out: list[Trip] = []
+            failures: list[str] = []
             for batch, answer in zip(batches, answers, strict=True):
                 if isinstance(answer, Driven):
                     results |= {result.ego: result for result in answer.results}
@@ -157,11 +158,14 @@ class _Work:
                     neighbours.append(answer.neighbours)
                 elif len(batch) > 1:
                     again += [[trip] for trip in batch]
+                    failures.append(answer.reason)
                 else:
                     results[batch[0].ego] = TripResult(batch[0].ego, TripOutcome.NOT_DRIVEN, answer.reason)
             batches = again + planned(crowded_out, self._setting.concurrent)
             if batches:
-                self._progress.stage("trips that found no place beside the others", len(batches))
+                why = [f"trips driven again, each alone, for a simulation failed: {reason}" for reason in failures]
+                why += ["trips that found no place beside the others"] if crowded_out else []
+                self._progress.stage("; ".join(dict.fromkeys(why)), len(batches))
                 answers = self._simulated(["ads"] * len(batches), batches, self._setting.concurrent)
         return results, together(neighbours)
 

@@ -87,7 +87,7 @@ class World:
         return self._session.arrived()
 
     def is_stopping(self, vehicle: str) -> bool:
-        """Whether a vehicle that is under way makes a stop of its own now, parks or waits for somebody."""
+        """Whether a vehicle makes a stop of its own now, parks or waits for somebody; not one that is gone."""
         return self._session.is_stopping(vehicle)
 
     def teleported(self) -> tuple[str, ...]:

@@ -246,8 +246,8 @@ class Session:
         )
 
     def is_stopping(self, vehicle: str) -> bool:
-        """Whether a vehicle that is in the simulation makes a stop of its own."""
-        return bool(libsumo.vehicle.isStopped(vehicle))
+        """Whether a vehicle makes a stop of its own; one that is not in the simulation (any more) does not."""
+        return self.has(vehicle) and bool(libsumo.vehicle.isStopped(vehicle))
 
     def teleported(self) -> tuple[str, ...]:
         """Vehicles that SUMO began to teleport in the last step."""

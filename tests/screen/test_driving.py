@@ -169,6 +169,18 @@ def test_what_comes_of_a_trip_is_not_known_where_the_scenario_ends_before_its_pa
         assert [one.violation.kind for one in result.violations] == ["destination_not_reached"]
 
 
+def test_an_ego_held_up_by_another_is_over_with_it(tmp_path: Path, lane: Path) -> None:
+    routes = (
+        '<vehicle id="parked" depart="0" departPos="195"><route edges="we"/><stop lane="we_0" endPos="200" '
+        'duration="1000"/></vehicle><trip id="head" from="we" to="we" depart="1" departPos="170"/>'
+        '<trip id="tail" from="we" to="we" depart="1" departPos="150"/>'
+    )
+    trips = [Trip(name, 1.0, 230.0, 17.0, 40.0) for name in ("head", "tail")]
+    scenario = traffic(tmp_path, lane, routes, end="140")
+    results = in_child(partial(driven, scenario, StackSource(), trips, 2, HEAR)).results
+    assert [(one.ego, one.outcome) for one in results] == [("head", TripOutcome.CUT), ("tail", TripOutcome.CUT)]
+
+
 def test_an_ego_is_not_held_up_by_a_queue_that_another_ego_heads(tmp_path: Path, lane: Path) -> None:
     routes = (
         '<vehicle id="parked" depart="0" departPos="195"><route edges="we"/><stop lane="we_0" endPos="200" '

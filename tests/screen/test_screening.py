@@ -29,10 +29,14 @@ ROUTES = """<vType id="bus" vClass="bus"/>
 
 
 class Heard(Progress):
-    """Counts simulations."""
+    """Counts simulations, and notes of which stages."""
 
     def __init__(self) -> None:
         self.simulations = 0
+        self.stages: list[str] = []
+
+    def stage(self, what: str, simulations: int) -> None:  # noqa: ARG002
+        self.stages.append(what)
 
     def over(self, left: int) -> None:  # noqa: ARG002
         self.simulations += 1
@@ -90,6 +94,17 @@ def test_a_stack_of_ones_own_is_driven_again_once_any_of_its_files_is_edited(
     assert simulations[0] > 0
     assert simulations[1] == 0
     assert simulations[2] == simulations[0]
+
+
+def test_trips_that_went_down_with_others_are_driven_again_alone_and_it_is_told_why(
+    tmp_path: Path, street: Path
+) -> None:
+    heard = Heard()
+    screening = screening_of(traffic(tmp_path, street, ROUTES), "small_stacks:leaving", progress=heard)
+    reason = "the process ended with code 3 without an answer"
+    assert heard.stages[-1] == f"trips driven again, each alone, for a simulation failed: {reason}"
+    assert heard.simulations == 5
+    assert [(trip.outcome, trip.reason) for trip in screening.ads] == [(TripOutcome.NOT_DRIVEN, reason)] * 2
 
 
 def test_what_is_said_as_data(reckless: Screening) -> None:
