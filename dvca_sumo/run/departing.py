@@ -59,12 +59,8 @@ class Departing:
         """
         roadmap = self._roadmap_of(entry.vehicle_class)
         length = roadmap.lanes[f"{entry.edges[-1]}_0"].length
-        arrival = self.definitions.arrival_position(entry.ego)
-        if arrival is None:
-            arrival = length
-        elif arrival < 0.0:
-            arrival += length
-        return roadmap.route(entry.edges, entry.lane, entry.position, None, min(max(arrival, 0.0), length))
+        arrival = self.definitions.arrival_position(entry.ego, length)
+        return roadmap.route(entry.edges, entry.lane, entry.position, None, arrival)
 
     def judging(self, entry: Entry, route: Route) -> Judging:
         """Fresh oracles for a trip, with the vehicle's own thresholds.
@@ -108,7 +104,7 @@ class Departing:
     def _is_fit(self, entry: Entry) -> bool:
         try:
             route = self.route(entry)
-        except RouteError:
+        except (RouteError, ScenarioError):
             return False
         return route.destination - route.start >= _SHORTEST_AUTO_TRIP
 

@@ -71,8 +71,8 @@ class Definitions:
         """Whether `--ego` accepts that name."""
         return self._tag(vehicle) is not None
 
-    def arrival_position(self, vehicle: str) -> float | None:
-        """Where on its last edge it shall arrive [m]; negative counts from the end; None: at the end.
+    def arrival_position(self, vehicle: str, length: float) -> float:
+        """Where on an edge of `length` [m] it shall arrive [m]; at the end, unless its definition says where.
 
         SUMO does not tell it of a running vehicle, so it is read from the vehicle's own definition.
 
@@ -80,19 +80,24 @@ class Definitions:
             ScenarioError: The definition holds something that is no position.
         """
         found = re.search(r"\barrivalPos\s*=\s*[\"']([^\"']*)", self._tag(vehicle) or "")
-        return _position(found.group(1), vehicle) if found else None
+        position = _position(found.group(1), vehicle, length) if found else length
+        return min(max(position, 0.0), length)
 
     def _tag(self, vehicle: str) -> str | None:
         return self._tags.get(vehicle) or self._flows.get(vehicle.rpartition(".")[0])
 
 
-def _position(text: str, ego: str) -> float | None:
+def _position(text: str, ego: str, length: float) -> float:
     if text in ("max", "random"):
-        return None
+        return length
+    if text == "center":
+        return 0.5 * length
     try:
-        return float(text)
+        position = float(text)
     except ValueError:
-        raise ScenarioError(f"arrivalPos of {ego} is no position: {text!r} (allowed: metres, max, random)") from None
+        allowed = "metres, center, max, random"
+        raise ScenarioError(f"arrivalPos of {ego} is no position: {text!r} (allowed: {allowed})") from None
+    return position + length if position < 0.0 else position
 
 
 def _candidates(names: list[str]) -> str:

@@ -128,7 +128,7 @@ def _trip(entry: Entry, departing: Departing, durations: Mapping[str, float], en
     """The trip, or why it is none."""
     try:
         route = departing.route(entry)
-    except (RouteError, KeyError):
+    except (RouteError, KeyError, ScenarioError):
         return "without a drivable route"
     length = route.destination - route.start
     if length < SHORTEST:

@@ -84,6 +84,7 @@ def test_edges_shorter_than_the_ego(
         {"departPos": "last"},
         {"departEdge": 1, "departPos": 20},
         {"departPos": 20, "arrivalPos": "-1000"},
+        {"departPos": 20, "arrivalPos": "center"},
     ],
     ids=str,
 )

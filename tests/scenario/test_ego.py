@@ -88,7 +88,7 @@ def test_an_ego_is_found_in_additional_and_included_files(tmp_path: Path, net: P
     )
     config = scenario_file(tmp_path, net, "", '<include href="deeper/more.xml"/>')
     assert load_scenario(config).ego == "ego"
-    assert Definitions(read_configuration(config)).arrival_position("ego") == 7.0
+    assert Definitions(read_configuration(config)).arrival_position("ego", 100.0) == 7.0
 
 
 def test_a_marked_ego_is_found_in_a_gzipped_file(tmp_path: Path, net: Path) -> None:
@@ -119,30 +119,31 @@ def test_a_marked_vehicle_in_a_file_that_is_not_xml_names_the_file(tmp_path: Pat
 @pytest.mark.parametrize(
     ("attribute", "expected"),
     [
-        ("", None),
-        ('arrivalPos="max"', None),
-        ('arrivalPos="random"', None),
-        ('arrivalPos="-5.5"', -5.5),
+        ("", 80.0),
+        ('arrivalPos="max"', 80.0),
+        ('arrivalPos="random"', 80.0),
+        ('arrivalPos="center"', 40.0),
+        ('arrivalPos="-5.5"', 74.5),
+        ('arrivalPos="-90"', 0.0),
         ("arrivalPos='30'", 30.0),
+        ('arrivalPos="90"', 80.0),
     ],
 )
-def test_the_arrival_position_is_the_vehicles_own(
-    tmp_path: Path, net: Path, attribute: str, expected: float | None
-) -> None:
+def test_the_arrival_position_is_the_vehicles_own(tmp_path: Path, net: Path, attribute: str, expected: float) -> None:
     other = '<vehicle id="other" arrivalPos="99"/>'
     commented = '<!-- <vehicle id="ego" arrivalPos="98"/> -->'
     config = scenario_file(
         tmp_path, net, f'{other}{commented}<vehicle\n  depart="0" id="ego"\n {attribute}>{MARK}</vehicle>'
     )
-    assert Definitions(read_configuration(config)).arrival_position("ego") == expected
+    assert Definitions(read_configuration(config)).arrival_position("ego", 80.0) == expected
 
 
 def test_the_arrival_position_of_a_flow_is_that_of_its_vehicles(tmp_path: Path, net: Path) -> None:
     config = scenario_file(tmp_path, net, '<flow id="f" number="3" arrivalPos="12"/>')
-    assert Definitions(read_configuration(config)).arrival_position("f.2") == 12.0
+    assert Definitions(read_configuration(config)).arrival_position("f.2", 80.0) == 12.0
 
 
 def test_an_arrival_position_that_is_none_is_refused(tmp_path: Path, net: Path) -> None:
-    config = scenario_file(tmp_path, net, '<vehicle id="ego" arrivalPos="center"/>')
-    with pytest.raises(ScenarioError, match=r"arrivalPos of ego is no position: 'center' \(allowed: metres, max"):
-        Definitions(read_configuration(config)).arrival_position("ego")
+    config = scenario_file(tmp_path, net, '<vehicle id="ego" arrivalPos="middle"/>')
+    with pytest.raises(ScenarioError, match=r"arrivalPos of ego is no position: 'middle' \(allowed: metres, center"):
+        Definitions(read_configuration(config)).arrival_position("ego", 80.0)
