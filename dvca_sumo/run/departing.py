@@ -50,17 +50,25 @@ class Departing:
         """Another vehicle that has just departed."""
         return world.entry(vehicle, Thresholds.__struct_fields__)
 
+    def edges(self, entry: Entry) -> tuple[str, ...]:
+        """The edges of a trip, from the one that a vehicle stands on to the one where it shall arrive.
+
+        Raises:
+            ScenarioError: Its definition does not tell the latter.
+        """
+        arrival = self.definitions.arrival_row(entry.ego, entry.skipped + len(entry.edges))
+        return entry.edges[: max(arrival - entry.skipped, 0) + 1]
+
     def route(self, entry: Entry) -> Route:
         """The way from where a vehicle stands to its arrival position.
 
         Raises:
             RouteError: There is none that can be driven.
-            ScenarioError: Its definition holds an arrival position that is none.
+            ScenarioError: Its definition holds an arrival that is none.
         """
-        roadmap = self._roadmap_of(entry.vehicle_class)
-        length = roadmap.lanes[f"{entry.edges[-1]}_0"].length
-        arrival = self.definitions.arrival_position(entry.ego, length)
-        return roadmap.route(entry.edges, entry.lane, entry.position, None, arrival)
+        roadmap, edges = self._roadmap_of(entry.vehicle_class), self.edges(entry)
+        arrival = self.definitions.arrival_position(entry.ego, roadmap.lanes[f"{edges[-1]}_0"].length)
+        return roadmap.route(edges, entry.lane, entry.position, None, arrival)
 
     def judging(self, entry: Entry, route: Route) -> Judging:
         """Fresh oracles for a trip, with the vehicle's own thresholds.

@@ -79,9 +79,29 @@ class Definitions:
         Raises:
             ScenarioError: The definition holds something that is no position.
         """
-        found = re.search(r"\barrivalPos\s*=\s*[\"']([^\"']*)", self._tag(vehicle) or "")
-        position = _position(found.group(1), vehicle, length) if found else length
+        text = self._attribute(vehicle, "arrivalPos")
+        position = length if text is None else _position(text, vehicle, length)
         return min(max(position, 0.0), length)
+
+    def arrival_row(self, vehicle: str, rows: int) -> int:
+        """On which of the `rows` edges of the whole route that it departed with it shall arrive; usually the last.
+
+        Raises:
+            ScenarioError: The definition does not tell it.
+        """
+        text = self._attribute(vehicle, "arrivalEdge")
+        if text is None:
+            return rows - 1
+        try:
+            return min(max(int(text), 0), rows - 1)
+        except ValueError:  # "random": SUMO draws it, and tells nobody
+            raise ScenarioError(
+                f"arrivalEdge of {vehicle} is no edge: {text!r} (allowed: its number along the route, from 0 on)"
+            ) from None
+
+    def _attribute(self, vehicle: str, name: str) -> str | None:
+        found = re.search(rf"\b{name}\s*=\s*[\"']([^\"']*)", self._tag(vehicle) or "")
+        return found.group(1) if found else None
 
     def _tag(self, vehicle: str) -> str | None:
         return self._tags.get(vehicle) or self._flows.get(vehicle.rpartition(".")[0])

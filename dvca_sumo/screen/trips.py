@@ -83,7 +83,7 @@ def drawn(scenario: Scenario, count: int) -> Draw:
             trips.append(trip)
             return True
 
-        _spread(_placed(scenario, entries), wanted, is_taken)
+        _spread(_placed(scenario, departing, entries), wanted, is_taken)
         return shorter
 
     departures = sum(refused.values()) + len(entries)
@@ -112,16 +112,28 @@ def _departures(
         world.advance()
         for name in world.departed():
             entry = departing.entry(name, world)
-            if entry.why_no_car:
-                refused[entry.why_no_car] += 1
-            elif not departing.definitions.has(name):
-                refused["not named in the scenario's files"] += 1
+            objection = _objection(entry, departing)
+            if objection:
+                refused[objection] += 1
             else:
                 entries[name] = entry
         for name in world.arrived():
             if name in entries and not entries[name].stops:  # which its trip goes without
                 durations[name] = world.time - entries[name].time
     return list(entries.values()), durations, refused
+
+
+def _objection(entry: Entry, departing: Departing) -> str:
+    """Why a departure is not looked at any further; empty if it is."""
+    if entry.why_no_car:
+        return entry.why_no_car
+    if not departing.definitions.has(entry.ego):
+        return "not named in the scenario's files"
+    try:
+        departing.edges(entry)
+    except ScenarioError:
+        return "without a known destination"
+    return ""
 
 
 def _trip(entry: Entry, departing: Departing, durations: Mapping[str, float], end: float) -> Trip | str:
@@ -143,7 +155,7 @@ def _trip(entry: Entry, departing: Departing, durations: Mapping[str, float], en
     return Trip(entry.ego, entry.time, length, freely, expected)
 
 
-def _placed(scenario: Scenario, entries: Sequence[Entry]) -> list[_Departure]:
+def _placed(scenario: Scenario, departing: Departing, entries: Sequence[Entry]) -> list[_Departure]:
     """Each departure with its stratum; edges are where their first lane has its middle."""
     if not entries:
         return []
@@ -153,7 +165,7 @@ def _placed(scenario: Scenario, entries: Sequence[Entry]) -> list[_Departure]:
         points = lanes[f"{edge}_0"].line.points
         return float(points[:, 0].mean()), float(points[:, 1].mean())
 
-    places = [(middle(entry.edges[0]), middle(entry.edges[-1])) for entry in entries]
+    places = [(middle(edges[0]), middle(edges[-1])) for edges in map(departing.edges, entries)]
     xs, ys = ([place[axis] for pair in places for place in pair] for axis in (0, 1))
     times = [entry.time for entry in entries]
 

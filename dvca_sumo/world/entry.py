@@ -29,6 +29,7 @@ class Entry(msgspec.Struct, frozen=True):
     width: float  # [m]
     vehicle_class: str
     edges: tuple[str, ...]  # of its route, from the one it stands on
+    skipped: int  # edges of its route before that one
     lane: str
     position: float  # [m] of the front bumper along the lane
     beside: float  # [m] and to the left of its centre

@@ -226,6 +226,7 @@ class Session:
         """How an inserted vehicle stands, and its "dvca." parameters among `settings`; changes nothing."""
         of = libsumo.vehicle
         x, y = of.getPosition(vehicle)
+        row = of.getRouteIndex(vehicle)
         texts = {name: of.getParameter(vehicle, f"dvca.{name}") for name in settings}
         return Entry(
             ego=vehicle,
@@ -237,7 +238,8 @@ class Session:
             length=of.getLength(vehicle),
             width=of.getWidth(vehicle),
             vehicle_class=of.getVehicleClass(vehicle),
-            edges=tuple(of.getRoute(vehicle)[of.getRouteIndex(vehicle) :]),
+            edges=tuple(of.getRoute(vehicle)[row:]),
+            skipped=row,
             lane=of.getLaneID(vehicle),
             position=of.getLanePosition(vehicle),
             beside=of.getLateralLanePosition(vehicle),

@@ -191,11 +191,12 @@ def test_vehicles_flows_and_trips_as_egos(tmp_path: Path, street: Path, element:
     assert record.ego == name
 
 
-def test_auto_takes_a_trip_that_is_long_enough(tmp_path: Path, street: Path) -> None:
-    def flow(name: str, edges: str) -> str:
-        return f'<flow id="{name}" begin="0" period="5" number="20"><route edges="{edges}"/></flow>'
+def test_auto_takes_a_trip_that_is_long_enough_to_an_end_that_is_known(tmp_path: Path, street: Path) -> None:
+    def flow(name: str, edges: str, arrival: str = "") -> str:
+        return f'<flow id="{name}" begin="0" period="5" number="20" {arrival}><route edges="{edges}"/></flow>'
 
-    config = scenario_file(tmp_path, street, flow("short", "nb bs") + flow("long", "ab bc cb ba"))
+    unknown = flow("unknown", "cb ba ab bc", 'arrivalEdge="random"')
+    config = scenario_file(tmp_path, street, unknown + flow("short", "nb bs") + flow("long", "ab bc cb ba"))
     record = driven(config, ego="auto", stop=StopRule(at=70.0))
     assert record.ego.startswith("long.")
     assert record.start >= 60.0

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from small_scenarios import driven, scenario_file
 
+from dvca_sumo.record import Record
 from dvca_sumo.scenario import ScenarioError
 from dvca_sumo.violations import Answer, Ending
 
@@ -25,13 +26,14 @@ def ego(edges: str, **attributes: object) -> str:
     return f'<vehicle id="ego" depart="0"{written}><route edges="{edges}"/></vehicle>'
 
 
-def assert_driven(config: Path) -> None:
+def assert_driven(config: Path) -> Record:
     record = driven(config)
     assert (record.violations, record.ending) == ([], Ending.ARRIVED)
     assert {judgement.answer for judgement in record.judgements} == {Answer.KEPT}
     assert record.stations[-1] - record.stations[0] == pytest.approx(
         record.route.destination - record.route.start, abs=3.0
     )
+    return record
 
 
 @pytest.mark.parametrize("edges", [ROUND_THE_BLOCK, ROUND_THE_OTHER_WAY], ids=["right turns", "left turns"])
@@ -92,6 +94,22 @@ def test_a_trip_may_begin_and_end_anywhere_on_its_edges(
     tmp_path: Path, street: Path, attributes: dict[str, object]
 ) -> None:
     assert_driven(scenario_file(tmp_path, street, ego("ab bc", **attributes)))
+
+
+@pytest.mark.parametrize(
+    ("attributes", "end"),
+    [
+        ({"arrivalEdge": 1}, (500.0, -1.6)),
+        ({"arrivalEdge": 1, "departEdge": 1, "arrivalPos": 100}, (308.0, -4.8)),
+        ({"arrivalEdge": 0, "departEdge": 1}, (500.0, -1.6)),
+    ],
+    ids=str,
+)
+def test_a_trip_ends_on_the_edge_of_its_route_where_it_shall_arrive(
+    tmp_path: Path, street: Path, attributes: dict[str, object], end: tuple[float, float]
+) -> None:
+    record = assert_driven(scenario_file(tmp_path, street, ego("ab bc cb ba", departPos=20, **attributes)))
+    assert (record.path[-1].x, record.path[-1].y) == pytest.approx(end, abs=6.0)
 
 
 def test_a_trip_of_five_metres_from_rest_is_driven(tmp_path: Path, street: Path) -> None:

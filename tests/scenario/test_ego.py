@@ -147,3 +147,17 @@ def test_an_arrival_position_that_is_none_is_refused(tmp_path: Path, net: Path) 
     config = scenario_file(tmp_path, net, '<vehicle id="ego" arrivalPos="middle"/>')
     with pytest.raises(ScenarioError, match=r"arrivalPos of ego is no position: 'middle' \(allowed: metres, center"):
         Definitions(read_configuration(config)).arrival_position("ego", 80.0)
+
+
+@pytest.mark.parametrize(
+    ("attribute", "row"), [("", 4), ('arrivalEdge="0"', 0), ("arrivalEdge='3'", 3), ('arrivalEdge="9"', 4)]
+)
+def test_the_arrival_edge_is_counted_along_the_route(tmp_path: Path, net: Path, attribute: str, row: int) -> None:
+    config = scenario_file(tmp_path, net, f'<flow id="f" number="3" arrivalPos="2" {attribute}/>')
+    assert Definitions(read_configuration(config)).arrival_row("f.1", 5) == row
+
+
+def test_an_arrival_edge_that_sumo_draws_is_refused(tmp_path: Path, net: Path) -> None:
+    config = scenario_file(tmp_path, net, '<vehicle id="ego" arrivalEdge="random"/>')
+    with pytest.raises(ScenarioError, match=r"arrivalEdge of ego is no edge: 'random' \(allowed: its number along"):
+        Definitions(read_configuration(config)).arrival_row("ego", 5)

@@ -108,6 +108,19 @@ def test_sumos_drivers_make_no_stops_that_the_ads_does_not_make(tmp_path: Path, 
     assert max(sumo.duration, ads.duration) < 100.0
 
 
+def test_a_trip_ends_on_the_same_edge_whoever_drives(tmp_path: Path, street: Path) -> None:
+    routes = '<route id="back" edges="ab bc cb ba"/><vehicle id="v" route="back" depart="1" arrivalEdge="1"/>'
+    scenario = traffic(tmp_path, street, routes)
+    trips = draw(scenario, 1).trips
+    assert trips[0].length == pytest.approx(495.0, abs=5.0)
+    ((ads,), (sumo,)) = (
+        drive(scenario, ["v"]).results,
+        in_child(partial(anchored, scenario, trips, HEAR)).results,
+    )
+    assert (ads.outcome, sumo.outcome) == (TripOutcome.ARRIVED, TripOutcome.ARRIVED)
+    assert (ads.distance, sumo.distance) == pytest.approx((trips[0].length, trips[0].length), abs=20.0)
+
+
 @pytest.mark.parametrize(
     ("other", "stop", "fault"),
     [

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from screen_scenes import draw, traffic
+from screen_scenes import TRAFFIC, draw, traffic
 
 from dvca_sumo.scenario import ScenarioError
 from dvca_sumo.screen.driving import planned
@@ -33,6 +33,12 @@ def test_trips_of_a_hundred_metres_are_drawn_where_longer_ones_are_too_few(tmp_p
     found = draw(traffic(tmp_path, street), 6)
     assert [one.ego for one in found.trips] == ["first", "second", "north", "east", "short", "stopping"]
     assert found.refused == {"of class bus": 1}
+
+
+def test_a_trip_that_ends_where_sumo_alone_knows_is_not_drawn_and_the_others_are(tmp_path: Path, street: Path) -> None:
+    found = draw(traffic(tmp_path, street, TRAFFIC.replace('id="second"', 'id="second" arrivalEdge="random"')), 10)
+    assert [one.ego for one in found.trips] == ["first", "north", "east", "short", "stopping"]
+    assert found.refused == {"of class bus": 1, "without a known destination": 1}
 
 
 def test_the_same_seed_draws_the_same_trips_and_another_seed_others(tmp_path: Path, street: Path) -> None:
