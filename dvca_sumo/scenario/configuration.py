@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 
 from dvca_sumo.scenario.errors import ScenarioError
+from dvca_sumo.scenario.texts import read_by
 
 # SUMO accepts options under several names; values here are the names SUMO prints in --help.
 SYNONYMS = {
@@ -82,8 +83,26 @@ class Configuration(msgspec.Struct, frozen=True):
 
     @property
     def contents(self) -> tuple[str, ...]:
-        """Digests of the sumocfg and of its input files: those of a copy are equal, wherever it is and however old."""
-        return tuple(content_of(path) for path in (self.path, self.net, *self.routes, *self.additionals))
+        """Digests of the sumocfg and of all files that SUMO reads for it: those of a copy are equal, however old it is.
+
+        Raises:
+            ScenarioError: A file cannot be read.
+        """
+        waiting = [self.net, *self.routes, *self.additionals]
+        found = dict.fromkeys([self.path, *waiting, *self._others()])
+        while waiting:
+            fresh = [one for one in _read_by(waiting.pop()) if one not in found]
+            found.update(dict.fromkeys(fresh))
+            waiting += fresh
+        return tuple(content_of(path) for path in found)
+
+    def _others(self) -> list[Path]:
+        """Files that other options name, a state to begin with for one; none that SUMO would write."""
+        words = (
+            value for name, value in self.options.items() if name not in self.outputs and not name.startswith("save-")
+        )
+        named = (self.path.parent / part.strip() for value in words for part in re.split(r"[,;]", value))
+        return [path.resolve() for path in named if _is_file(path)]
 
 
 def read_configuration(path: Path) -> Configuration:
@@ -128,6 +147,23 @@ def content_of(path: Path) -> str:
     """Digest of a file's bytes."""
     status = path.stat()
     return _content(path, status.st_size, status.st_mtime_ns)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # what is too long to be a name, say
+        return False
+
+
+def _read_by(path: Path) -> tuple[Path, ...]:
+    status = path.stat()
+    return _files_read(path, status.st_size, status.st_mtime_ns)
+
+
+@cache
+def _files_read(path: Path, _size: int, _modified: int) -> tuple[Path, ...]:
+    return read_by(path)
 
 
 @cache

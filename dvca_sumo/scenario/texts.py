@@ -11,6 +11,7 @@ from dvca_sumo.scenario.errors import ScenarioError
 _ENCODING = re.compile(rb"<\?xml[^>]*\bencoding\s*=\s*[\"']([A-Za-z0-9._-]+)")
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _INCLUDE = re.compile(r"<\s*include\b[^>]*?\bhref\s*=\s*[\"']([^\"']*)")
+_READ = re.compile(r"<\s*(?:include|rerouter|variableSpeedSign|calibrator)\b[^>]*?\b(?:href|file)\s*=\s*[\"']([^\"']+)")
 
 
 def opened_text(path: Path) -> str:
@@ -29,6 +30,16 @@ def opened_text(path: Path) -> str:
         return plain.decode(declared.group(1).decode() if declared else "utf-8", errors="replace").lstrip("\ufeff")
     except LookupError as error:
         raise ScenarioError(f"{path} cannot be read: {error}") from None
+
+
+def read_by(path: Path) -> tuple[Path, ...]:
+    """The files that a file has SUMO read besides it: what it includes, and steps of its signs and reroutings.
+
+    Raises:
+        ScenarioError: The file cannot be read.
+    """
+    named = ((path.parent / name).resolve() for name in _READ.findall(opened_text(path)))
+    return tuple(one for one in dict.fromkeys(named) if one.is_file())
 
 
 def texts_within(paths: tuple[Path, ...]) -> Iterator[tuple[Path, str]]:

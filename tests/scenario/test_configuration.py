@@ -99,18 +99,35 @@ def test_lists_of_files_are_taken_apart_and_relative_to_the_configuration(tmp_pa
     assert all(path.is_absolute() for path in routes)
 
 
-def test_contents_are_those_of_a_copy_and_change_with_any_of_the_files(tmp_path: Path, net: Path) -> None:
-    config = scenario_file(tmp_path / "a", net, additional="<poly/>")
+def test_contents_are_those_of_a_copy_and_change_with_any_file_that_sumo_reads(tmp_path: Path, net: Path) -> None:
+    """By an option, by what a file includes, and again by that one; but not with what a run of SUMO's own left."""
+    named = {
+        "weight_files": "weights.xml",
+        "load_state": "state.xml",
+        "summary": "left.xml",
+        "save_state.files": "end.xml",
+    }
+    read = ["more.rou.xml", "most.rou.xml", "closed.xml", "signs.xml", "flows.xml", "weights.xml", "state.xml"]
+    triggers = (
+        '<rerouter id="r" file="closed.xml"/><variableSpeedSign id="v" lanes="x" file="signs.xml"/>'
+        '<calibrator id="c" file="flows.xml"/><include href="nowhere.xml"/>'
+    )
+    config = scenario_file(tmp_path / "a", net, '<include href="more.rou.xml"/>', triggers, **named)
+    for name in [*read, "left.xml", "end.xml"]:
+        (tmp_path / "a" / name).write_text("<routes/>")
+    (tmp_path / "a" / "more.rou.xml").write_text('<routes><include href="most.rou.xml"/></routes>')
+    (tmp_path / "a" / "most.rou.xml").write_text('<routes><include href="more.rou.xml"/></routes>')
     contents = read_configuration(config).contents
     copy = Path(shutil.copytree(tmp_path / "a", tmp_path / "b")) / config.name
     os.utime(copy, (0.0, 0.0))
     assert read_configuration(copy).contents == contents
-    for name in ("run.sumocfg", "routes.rou.xml", "extra.add.xml", "../some.net.xml"):
+    for name in ["run.sumocfg", "routes.rou.xml", "extra.add.xml", "../some.net.xml", *read, "left.xml", "end.xml"]:
         path = tmp_path / "b" / name
         before = path.read_text()
         path.write_text(before + "<!-- -->")
-        assert read_configuration(copy).contents != contents, name
+        assert (read_configuration(copy).contents != contents) == (name not in ("left.xml", "end.xml")), name
         path.write_text(before)
+    assert read_configuration(copy).contents == contents
 
 
 def test_outputs_are_found_under_every_name(tmp_path: Path, net: Path) -> None:
