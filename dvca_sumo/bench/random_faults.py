@@ -17,8 +17,7 @@ from dvca_sumo.bench.places import HealthyDrive
 from dvca_sumo.bench.runs import Setting, analysed
 from dvca_sumo.bench.score import FAILED, Score
 from dvca_sumo.geometry.randomness import key_of, uniforms
-from dvca_sumo.interventions import FaultType, fault_library
-from dvca_sumo.interventions.library import Parameter
+from dvca_sumo.interventions import FaultType, Parameter, fault_library
 from dvca_sumo.interventions.targets import ALL, IN_WAY
 from dvca_sumo.messages import COMPONENTS
 from dvca_sumo.store import Store

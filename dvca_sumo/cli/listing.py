@@ -2,8 +2,7 @@
 
 import click
 
-from dvca_sumo.interventions import COMMON, fault_library
-from dvca_sumo.interventions.library import Parameter
+from dvca_sumo.interventions import COMMON, Parameter, fault_library
 from dvca_sumo.stack.bugs import BUGS
 
 

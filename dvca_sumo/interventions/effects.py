@@ -14,10 +14,12 @@ from dvca_sumo.geometry.frames import rotated
 from dvca_sumo.interventions.selection import Occasion
 from dvca_sumo.interventions.targets import rows_of
 from dvca_sumo.messages import (
+    COMPONENTS,
     CURVATURE,
     HEADING,
     PREDICTION_TIMES,
     SPEED,
+    Component,
     ControlCommand,
     Floats,
     Integers,
@@ -32,6 +34,19 @@ from dvca_sumo.messages import (
 )
 
 Parameters = Mapping[str, float | str]
+
+_OBJECT = {"object": "object"}  # what effects on single objects read: which of them
+
+
+class Effect(msgspec.Struct, frozen=True):
+    """A distortion and what a fault has to know of it; it is called like the function that it is."""
+
+    distort: Callable[[Message, Parameters, Occasion], Message | None]
+    components: tuple[Component, ...]  # whose messages it distorts
+    reads: dict[str, str]  # the parameters it reads, all of them each time, and the kind of each: number, object
+
+    def __call__(self, message: Message, parameters: Parameters, occasion: Occasion) -> Message | None:
+        return self.distort(message, parameters, occasion)
 
 
 def drop_objects(message: Message, parameters: Parameters, occasion: Occasion) -> Message:
@@ -184,21 +199,25 @@ def shift_pose(message: Message, parameters: Parameters, occasion: Occasion) -> 
     )
 
 
-EFFECTS: dict[str, Callable[[Message, Parameters, Occasion], Message | None]] = {
-    effect.__name__: effect
+def _numbers(*names: str) -> dict[str, str]:
+    return dict.fromkeys(names, "number")
+
+
+EFFECTS: dict[str, Effect] = {
+    effect.distort.__name__: effect
     for effect in (
-        shift_pose,
-        drop_objects,
-        resize_objects,
-        shift_objects,
-        speed_objects,
-        drop_predictions,
-        drift_predictions,
-        shift_path,
-        change_speed,
-        publish_nothing,
-        offset_acceleration,
-        offset_steering,
+        Effect(shift_pose, (Component.LOCALIZATION,), _numbers("left")),
+        Effect(drop_objects, (Component.PERCEPTION,), _OBJECT),
+        Effect(resize_objects, (Component.PERCEPTION,), _OBJECT | _numbers("length", "width")),
+        Effect(shift_objects, (Component.PERCEPTION,), _OBJECT | _numbers("ahead", "left")),
+        Effect(speed_objects, (Component.PERCEPTION,), _OBJECT | _numbers("ahead", "left")),
+        Effect(drop_predictions, (Component.PREDICTION,), _OBJECT),
+        Effect(drift_predictions, (Component.PREDICTION,), _OBJECT | _numbers("ahead", "left")),
+        Effect(shift_path, (Component.PLANNING,), _numbers("left")),
+        Effect(change_speed, (Component.PLANNING,), _numbers("factor", "error")),
+        Effect(publish_nothing, COMPONENTS, {}),
+        Effect(offset_acceleration, (Component.CONTROL,), _numbers("error")),
+        Effect(offset_steering, (Component.CONTROL,), _numbers("error")),
     )
 }
 

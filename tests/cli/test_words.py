@@ -1,12 +1,13 @@
 """The words of a command line: wrong ones are told in one line, and help explains the right ones."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from command_line import Said, assert_one_error
 
 from dvca_sumo.cli import ExitCode, program
-from dvca_sumo.interventions import fault_library
+from dvca_sumo.interventions import fault_library, library
 from dvca_sumo.stack.bugs import BUGS
 
 Called = Callable[..., Said]
@@ -31,6 +32,7 @@ BAD_FAULTS = {
     "planning.path:start=9,end=5": ("end=5", "before start=9"),
     "planning.path:first=9,last=5": ("last=5", "before first=9"),
     "planning.path:first=1.5": ("parameter first is no whole number: 1.5",),
+    "planning.path:start=8,start=9": ("parameter start is given twice",),
     "planning.path:state=1:2": ("parameter state is no state: '1:2'", "p:v:a"),
 }
 BAD_USAGE = {
@@ -125,6 +127,18 @@ def test_faults_lists_all_thirteen_with_component_parameters_and_units(called: C
             assert f"default {parameter.default}" in line
     common = "\n".join(sections["every fault"])
     assert [word for word in ("start", "end", "first", "last", "state", "[s", "[message]") if word not in common] == []
+
+
+def test_faults_tells_of_a_fault_file_that_is_wrong(
+    called: Called, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.toml").write_text('component = "control"\neffect = "offset_steering"\nsummary = ""\n')
+    monkeypatch.setattr(library, "folder", lambda _: tmp_path)
+    fault_library.cache_clear()
+    try:
+        assert_one_error(called("faults"), ExitCode.BAD_INPUT, "mine.toml", "offset_steering reads 'error'")
+    finally:
+        fault_library.cache_clear()
 
 
 def test_faults_lists_the_real_bugs_with_component_and_source(called: Called) -> None:

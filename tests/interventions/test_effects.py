@@ -1,17 +1,19 @@
 import math
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
 from dvca_sumo.interventions import EFFECTS
-from dvca_sumo.interventions.effects import Parameters
+from dvca_sumo.interventions.effects import Effect, Parameters
 from dvca_sumo.messages import (
     ACCELERATION,
     CURVATURE,
     HEADING,
     PREDICTION_TIMES,
     SPEED,
+    Component,
     ControlCommand,
     LocalizationEstimate,
     Message,
@@ -93,6 +95,40 @@ NOTHING_TO_DISTORT: dict[str, list[tuple[Message, Parameters]]] = {
     "offset_acceleration": [(command(), {"error": 0.0})],
     "offset_steering": [(command(), {"error": 0.0})],
 }
+
+
+MESSAGES: dict[Component, Message] = {
+    Component.LOCALIZATION: estimate(),
+    Component.PERCEPTION: tracked(BOTH),
+    Component.PREDICTION: predicted(BOTH),
+    Component.PLANNING: trajectory(),
+    Component.CONTROL: command(),
+}
+
+
+class Watched(dict[str, float | str]):
+    """Parameters that know which of them were read."""
+
+    def __init__(self, values: Mapping[str, float | str]) -> None:
+        super().__init__(values)
+        self.read: set[str] = set()
+
+    def __getitem__(self, name: str) -> float | str:
+        self.read.add(name)
+        return super().__getitem__(name)
+
+
+@pytest.mark.parametrize(
+    ("effect", "component"),
+    [(effect, component) for effect in EFFECTS.values() for component in effect.components],
+    ids=lambda one: one.distort.__name__ if isinstance(one, Effect) else one,
+)
+def test_an_effect_distorts_its_components_messages_and_reads_what_it_says(
+    effect: Effect, component: Component
+) -> None:
+    parameters = Watched({name: "all" if kind == "object" else 0.5 for name, kind in effect.reads.items()})
+    assert effect(MESSAGES[component], parameters, occasion(BOTH)) is not MESSAGES[component]
+    assert parameters.read == set(effect.reads)
 
 
 def test_every_effect_is_asked_for_the_case_of_nothing_to_distort() -> None:
