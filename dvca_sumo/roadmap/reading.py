@@ -19,6 +19,7 @@ from dvca_sumo.roadmap.lanes import Junction, Lane, Movement, RoadMapError
 
 _ROAD = ("", "internal")  # edge functions with traffic along them
 _MOTORWAYS = ("highway.motorway", "highway.trunk")  # SUMO's types of edges imported from OpenStreetMap
+_PREFIX = "dvca."  # of parameters that are this program's
 _LIMIT_KEY, _MISSING = "dvca.map.speed_limit", "missing"  # parameter of an edge: a gap in the map an ADS drives on
 _STUB = 0.01  # [m] length given to a lane drawn as a single point
 
@@ -36,12 +37,15 @@ class NetContents(msgspec.Struct, frozen=True, eq=False):
 def read_net(path: Path, vehicle_class: str) -> NetContents:
     """Read `path` (.net.xml, also gzipped) as a driver of `vehicle_class` sees it.
 
-    Raises RoadMapError when the file is missing or no net, or the class is unknown to SUMO.
+    Raises RoadMapError when the file is missing or no net, the class is unknown to SUMO, or an edge has a "dvca."
+    parameter that there is not, or with a value that is none.
     """
     if vehicle_class not in SUMO_VEHICLE_CLASSES:
         raise RoadMapError(f"unknown vehicle class {vehicle_class!r}; SUMO knows passenger, bus, truck, taxi, ...")
     net = _parsed(path)
     edges = [edge for edge in net.getEdges() if edge.getFunction() in (*_ROAD, "crossing")]
+    for edge in net.getEdges():
+        _refuse_wrong_parameters(edge)
     is_left_hand = _is_left_hand(edges)
     lanes = {lane.id: lane for edge in edges for lane in _lanes(edge, vehicle_class, is_left_hand=is_left_hand)}
     vias, groups = _vias(edges), _signal_groups(net)
@@ -69,6 +73,14 @@ def _parsed(path: Path) -> Any:
     if not net.getEdges(withInternal=False):
         raise RoadMapError(f"not a SUMO net: {path} (no edges)")
     return net
+
+
+def _refuse_wrong_parameters(edge: Any) -> None:
+    for key, text in edge.getParams().items():
+        if key.startswith(_PREFIX) and key != _LIMIT_KEY:
+            raise RoadMapError(f"no parameter {key} of the edge {edge.getID()!r} (allowed: {_LIMIT_KEY})")
+        if key == _LIMIT_KEY and text != _MISSING:
+            raise RoadMapError(f"parameter {key} of the edge {edge.getID()!r} is {text!r} (allowed: {_MISSING})")
 
 
 def _lane_ids(edge: Any) -> Iterator[str]:

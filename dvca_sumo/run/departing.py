@@ -1,7 +1,8 @@
 """How a vehicle of a scenario becomes an ego: its route, its stack, its oracles."""
 
+import difflib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +11,7 @@ from dvca_sumo.oracles import Places, judges
 from dvca_sumo.roadmap import RoadMap, Route, RouteError
 from dvca_sumo.run.drive import ARRIVED_WITHIN, Drive, Judging
 from dvca_sumo.run.task import Task
-from dvca_sumo.scenario import Definitions, Scenario, ScenarioError
+from dvca_sumo.scenario import MARK, Definitions, Parameter, Scenario, ScenarioError
 from dvca_sumo.stack.reference import StackContext, StackFactory
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.world import Entry, VehicleLimits, World, shape_of
@@ -35,14 +36,20 @@ class Departing:
 
     @cached_property
     def definitions(self) -> Definitions:
-        """Of the scenario's vehicles."""
-        return Definitions(self._scenario.configuration)
+        """Of the scenario's vehicles.
+
+        Raises:
+            ScenarioError: A vehicle has a "dvca." parameter that there is not, or with a value that is none.
+        """
+        definitions = Definitions(self._scenario.configuration)
+        _refuse_wrong(definitions.parameters, self._scenario.ego)
+        return definitions
 
     def awaited(self, world: World) -> Entry:
         """The scenario's ego at its departure.
 
         Raises:
-            ScenarioError: It never departs.
+            ScenarioError: It never departs, or a vehicle's parameter is wrong; see `definitions`.
         """
         return world.await_ego(Thresholds.__struct_fields__, self._is_fit)
 
@@ -130,11 +137,28 @@ def patience(freely: float) -> float:
 
 
 def _thresholds(entry: Entry) -> Thresholds:
-    for name, text in entry.parameters.items():
-        try:
-            is_allowed = float(text) >= 0.0  # NaN is not
-        except ValueError:
-            is_allowed = False
-        if not is_allowed:
-            raise ScenarioError(f"parameter dvca.{name} of the ego {entry.ego!r} is {text!r} (allowed: 0 or more)")
-    return Thresholds(**{name: float(text) for name, text in entry.parameters.items()})
+    values = {name: _threshold(f"the ego {entry.ego!r}", name, text) for name, text in entry.parameters.items()}
+    return Thresholds(**values)
+
+
+def _threshold(whose: str, name: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not value >= 0.0:  # NaN is not
+        raise ScenarioError(f"parameter dvca.{name} of {whose} is {text!r} (allowed: 0 or more)")
+    return value
+
+
+def _refuse_wrong(parameters: Sequence[Parameter], ego: str) -> None:
+    """Of all vehicles: SUMO tells only those parameters of an ego that it is asked for by name."""
+    for vehicle, name, text in parameters:
+        whose = f"the ego {vehicle!r}" if vehicle == ego else f"the vehicle {vehicle!r}"
+        if name in Thresholds.__struct_fields__:
+            _threshold(whose, name, text)
+        elif name != MARK:
+            known = [f"dvca.{one}" for one in (*Thresholds.__struct_fields__, MARK)]
+            close = difflib.get_close_matches(f"dvca.{name}", known, n=1)
+            hint = f"did you mean {close[0]}?" if close else f"allowed: {', '.join(known)}"
+            raise ScenarioError(f"no parameter dvca.{name} of {whose} ({hint})")

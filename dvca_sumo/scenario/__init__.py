@@ -10,13 +10,16 @@ from dvca_sumo.scenario.configuration import Configuration, content_of, read_con
 from dvca_sumo.scenario.departures import last_departure
 from dvca_sumo.scenario.ego import AUTO, Definitions, find_ego
 from dvca_sumo.scenario.errors import ScenarioError
+from dvca_sumo.scenario.parameters import MARK, Parameter
 from dvca_sumo.scenario.silence import input_words, silenced
 
 __all__ = [
     "AUTO",
+    "MARK",
     "STEP_LENGTH",
     "Definitions",
     "Override",
+    "Parameter",
     "Scenario",
     "ScenarioError",
     "content_of",

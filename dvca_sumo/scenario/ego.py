@@ -1,12 +1,11 @@
 """Which vehicle of a scenario is the ego."""
 
 import difflib
-import io
 import re
-import xml.etree.ElementTree as ET
 
 from dvca_sumo.scenario.configuration import Configuration
 from dvca_sumo.scenario.errors import ScenarioError
+from dvca_sumo.scenario.parameters import MARK, Parameter, parameters_within
 from dvca_sumo.scenario.texts import texts_within
 
 AUTO = "auto"
@@ -21,15 +20,14 @@ def find_ego(configuration: Configuration, asked: str | None) -> str:
     vehicle id `ego`.
 
     Raises:
-        ScenarioError: There is no such vehicle; candidates are listed.
+        ScenarioError: There is no such vehicle, candidates being listed; or a mark is neither true nor false.
     """
     if asked == AUTO:
         return AUTO
     names: list[str] = []
     marked: list[str] = []
     for path, text in texts_within((*configuration.routes, *configuration.additionals)):
-        if "dvca.ego" in text:
-            marked.extend(_marked(text, str(path)))
+        marked.extend(one.vehicle for one in parameters_within(text, path) if one.name == MARK and one.is_true)
         for element, name in _VEHICLE.findall(text):
             names.append(f"{name}.0" if element == "flow" else name)
     flows = {name.rsplit(".", 1)[0] for name in names if name.endswith(".0")}
@@ -62,10 +60,12 @@ class Definitions:
         """
         self._tags: dict[str, str] = {}  # first tag of each vehicle and trip, by name
         self._flows: dict[str, str] = {}
-        for _, text in texts_within((*configuration.routes, *configuration.additionals)):
+        self.parameters: list[Parameter] = []
+        for path, text in texts_within((*configuration.routes, *configuration.additionals)):
             for match in _VEHICLE.finditer(text):
                 tags = self._flows if match.group(1) == "flow" else self._tags
                 tags.setdefault(match.group(2), text[match.start() : text.index(">", match.start())])
+            self.parameters += parameters_within(text, path)
 
     def has(self, vehicle: str) -> bool:
         """Whether `--ego` accepts that name."""
@@ -125,22 +125,3 @@ def _candidates(names: list[str]) -> str:
         return "the scenario has no vehicles"
     more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
     return "candidates: " + ", ".join(names[:_LISTED]) + more
-
-
-def _marked(text: str, path: str) -> list[str]:
-    found: list[str] = []
-    current: ET.Element | None = None
-    try:
-        for event, element in ET.iterparse(io.StringIO(text), ("start", "end")):  # noqa: S314 - the user's own file
-            if element.tag in ("vehicle", "trip", "flow"):
-                current = element if event == "start" else None
-            elif event == "end" and current is not None and _is_mark(element):
-                name = current.get("id", "")
-                found.append(f"{name}.0" if current.tag == "flow" else name)
-    except ET.ParseError as error:
-        raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
-    return found
-
-
-def _is_mark(element: ET.Element) -> bool:
-    return element.tag == "param" and element.get("key") == "dvca.ego" and element.get("value", "").lower() == "true"

@@ -31,6 +31,12 @@ def _replaced(name: str, text: str) -> Spoil:
     return lambda folder: (folder / name).write_text(text, encoding="utf-8")
 
 
+def _add_to_edge(folder: Path, text: str) -> None:
+    net = (folder / "net.net.xml").read_text(encoding="utf-8")
+    head, edge, tail = net.partition('<edge id="bc"')
+    (folder / "net.net.xml").write_text(head + edge + tail.replace("</edge>", f"{text}</edge>", 1), encoding="utf-8")
+
+
 class Broken(NamedTuple):
     """A scenario with one defect, and what must be said of it."""
 
@@ -98,6 +104,26 @@ BROKEN = {
     "threshold ill-typed": Broken(
         ("dvca.ttc", "'ego'", "'soon'", "allowed"),
         routes=EGO.replace("/>", '><param key="dvca.ttc" value="soon"/></trip>'),
+    ),
+    "threshold empty": Broken(
+        ("dvca.ttc", "'ego'", "''", "allowed"),
+        routes=EGO.replace("/>", '><param key="dvca.ttc" value=""/></trip>'),
+    ),
+    "threshold misspelt": Broken(
+        ("no parameter dvca.safe_distence of the ego 'ego' (did you mean dvca.safe_distance?)",),
+        routes=EGO.replace("/>", '><param key="dvca.safe_distence" value="0.5"/></trip>'),
+    ),
+    "mark misspelt, on a vehicle that is not the ego": Broken(
+        ("no parameter dvca.Ego of the vehicle 'car' (did you mean dvca.ego?)",),
+        routes=EGO + '<vehicle id="car" depart="9"><route edges="bc"/><param key="dvca.Ego" value="true"/></vehicle>',
+    ),
+    "mark that is neither true nor false": Broken(
+        ("parameter dvca.ego of 'ego' is 'maybe'", "allowed: true, 1, yes, on"),
+        routes=EGO.replace("/>", '><param key="dvca.ego" value="maybe"/></trip>'),
+    ),
+    "parameter of an edge misspelt": Broken(
+        ("no parameter dvca.map.speedlimit of the edge 'bc' (allowed: dvca.map.speed_limit)",),
+        lambda folder: _add_to_edge(folder, '<param key="dvca.map.speedlimit" value="missing"/>'),
     ),
 }
 

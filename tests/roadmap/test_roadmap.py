@@ -76,6 +76,26 @@ def test_a_gap_in_the_ego_s_map_hides_a_limit_that_holds_nevertheless(
     assert [lane == "ab_0" for lane in route.lane_ids] == hidden.tolist()
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "says"),
+    [
+        ("dvca.map.speed_limit", "mising", "speed_limit of the edge 'ab' is 'mising' .allowed: missing"),
+        (
+            "dvca.map.speed_limits",
+            "missing",
+            "no parameter dvca.map.speed_limits of the edge 'ab' .*dvca.map.speed_limit",
+        ),
+        ("dvca.safe_distance", "1", "no parameter dvca.safe_distance of the edge 'ab'"),
+    ],
+)
+def test_a_parameter_of_an_edge_that_would_be_ignored_is_refused(
+    plain: NetBuilder, key: str, value: str, says: str
+) -> None:
+    edges = f'<edge id="ab" from="a" to="b"><param key="other" value="1"/><param key="{key}" value="{value}"/></edge>'
+    with pytest.raises(RoadMapError, match=says):
+        plain(TWO_NODES, edges)
+
+
 def test_bus_lane_is_no_neighbour_of_a_car(plain: NetBuilder) -> None:
     lanes = plain(TWO_NODES, BUS_LANE).lanes
     assert not lanes["e_0"].is_drivable

@@ -33,6 +33,29 @@ def test_the_asked_for_vehicle_comes_before_a_marked_one_and_that_before_the_one
     assert chosen(tmp_path, net, routes, AUTO) == AUTO
 
 
+@pytest.mark.parametrize(
+    ("value", "ego"),
+    [*((word, "a") for word in ("true", "True", "1", "yes", "on")), *((word, "ego") for word in ("false", "0", "NO"))],
+)
+def test_a_mark_says_so_in_any_word_that_sumo_takes_for_true(tmp_path: Path, net: Path, value: str, ego: str) -> None:
+    routes = f'<vehicle id="ego"/><trip id="a">{MARK}</trip>'.replace('"true"', f'"{value}"')
+    assert chosen(tmp_path, net, routes) == ego
+
+
+@pytest.mark.parametrize("value", ["maybe", "2", ""])
+def test_a_mark_that_is_neither_true_nor_false_is_refused(tmp_path: Path, net: Path, value: str) -> None:
+    routes = f'<vehicle id="ego"/><trip id="a">{MARK}</trip>'.replace('"true"', f'"{value}"')
+    with pytest.raises(ScenarioError, match=rf"parameter dvca\.ego of 'a' is '{value}' \(allowed: true, 1, yes, on;"):
+        chosen(tmp_path, net, routes)
+
+
+def test_parameters_are_those_of_vehicles_whose_names_are_this_program_s(tmp_path: Path, net: Path) -> None:
+    ours, other = '<param key="dvca.ttc" value="0.7"/>', '<param key="other" value="1"/>'
+    routes = f'<trip id="a">{other}{ours}</trip><flow id="f">{ours}</flow><person id="p">{ours}</person>'
+    definitions = Definitions(read_configuration(scenario_file(tmp_path, net, routes)))
+    assert definitions.parameters == [("a", "ttc", "0.7"), ("f.0", "ttc", "0.7")]
+
+
 def test_without_any_the_candidates_are_listed(tmp_path: Path, net: Path) -> None:
     routes = "".join(f'<vehicle id="v{number}"/>' for number in range(7))
     with pytest.raises(ScenarioError, match=r"names no ego: use --ego ID.*candidates: v0, v1, v2, v3, v4 and 2 more"):

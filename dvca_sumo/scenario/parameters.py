@@ -1,0 +1,57 @@
+"""What a scenario's files say to this program: the "dvca." parameters of its vehicles."""
+
+import io
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import NamedTuple
+
+from dvca_sumo.scenario.errors import ScenarioError
+
+MARK = "ego"  # name of the parameter that marks the ego
+_PREFIX = "dvca."
+_TRUE, _FALSE = ("true", "1", "yes", "on", "t", "x"), ("false", "0", "no", "off", "f", "-")  # as SUMO reads them
+
+
+class Parameter(NamedTuple):
+    """One of them."""
+
+    vehicle: str  # of a flow, its first
+    name: str  # without "dvca."
+    text: str
+
+    @property
+    def is_true(self) -> bool:
+        """What it says when it is a mark.
+
+        Raises:
+            ScenarioError: It says neither true nor false.
+        """
+        said = self.text.lower()
+        if said not in (*_TRUE, *_FALSE):
+            allowed = "allowed: true, 1, yes, on; false, 0, no, off"
+            raise ScenarioError(f"parameter {_PREFIX}{self.name} of {self.vehicle!r} is {self.text!r} ({allowed})")
+        return said in _TRUE
+
+
+def parameters_within(text: str, path: Path) -> list[Parameter]:
+    """Those in the text of one file, in their order.
+
+    Raises:
+        ScenarioError: There are some, and the text is not well-formed.
+    """
+    found: list[Parameter] = []
+    if _PREFIX not in text:
+        return found
+    current: ET.Element | None = None
+    try:
+        for event, element in ET.iterparse(io.StringIO(text), ("start", "end")):  # noqa: S314 - the user's own file
+            if element.tag in ("vehicle", "trip", "flow"):
+                current = element if event == "start" else None
+            elif event == "end" and current is not None and element.tag == "param":
+                key, name = element.get("key", ""), current.get("id", "")
+                if key.startswith(_PREFIX):
+                    vehicle = f"{name}.0" if current.tag == "flow" else name
+                    found.append(Parameter(vehicle, key.removeprefix(_PREFIX), element.get("value", "")))
+    except ET.ParseError as error:
+        raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
+    return found
