@@ -33,7 +33,7 @@ class FactualDrive(msgspec.Struct, frozen=True):
     request: Request
     engine: Engine
     record: Record
-    bug: str | None = None  # that the reference stack was built with
+    source: StackSource = StackSource()  # of the stack that drove
 
 
 def load_scenario(
@@ -73,9 +73,10 @@ def drive(
         RunFailedError: The run's process crashed or hung.
     """
     request = Request(scenario, tuple(planted_fault(text) for text in faults), repeats)
-    chosen = ENGINES[engine or DEFAULT_ENGINE](scenario.configuration.net, StackSource(stack, bug), jobs)
+    source = StackSource(stack, bug)
+    chosen = ENGINES[engine or DEFAULT_ENGINE](scenario.configuration.net, source, jobs)
     try:
-        return FactualDrive(request, chosen, factual_run(chosen, request), bug)
+        return FactualDrive(request, chosen, factual_run(chosen, request), source)
     except BaseException:
         chosen.close()
         raise

@@ -111,10 +111,10 @@ def run(
 
 
 def _publish(drive: FactualDrive, found: Attribution, timing: Timing, output: Path | None, *, as_json: bool) -> None:
-    result = result_of(drive.request.scenario, drive.request.faults, found, timing, drive.bug)
+    result = result_of(drive.request, drive.source, found, timing)
     if output is not None:
         write_whole(output / "result.json", json.dumps(result, indent=1) + "\n")
-    click.echo(json.dumps(result, indent=1) if as_json else verdict_text(found, timing, drive.bug))
+    click.echo(json.dumps(result, indent=1) if as_json else verdict_text(found, timing, drive.source.bug))
 
 
 def _exit_code(found: Attribution) -> ExitCode:

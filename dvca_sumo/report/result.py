@@ -6,12 +6,13 @@ from importlib.metadata import PackageNotFoundError, version
 
 import msgspec
 
-from dvca_sumo.analysis.attribution import Attribution, Planted
+from dvca_sumo.analysis.attribution import Attribution, Planted, Request
 from dvca_sumo.analysis.dtest import Probe
 from dvca_sumo.interventions import Fault
 from dvca_sumo.messages import COMPONENTS
 from dvca_sumo.record import MessageMark
-from dvca_sumo.scenario import STEP_LENGTH, Scenario
+from dvca_sumo.scenario import STEP_LENGTH
+from dvca_sumo.stack.sources import StackSource
 from dvca_sumo.violations import Violation
 
 SCHEMA = 1
@@ -27,11 +28,9 @@ class Timing(msgspec.Struct, frozen=True):
     jobs: int
 
 
-def result_of(
-    scenario: Scenario, faults: tuple[Fault, ...], found: Attribution, timing: Timing, bug: str | None = None
-) -> Json:
+def result_of(request: Request, source: StackSource, found: Attribution, timing: Timing) -> Json:
     """The whole result, of JSON types only."""
-    record = found.record
+    scenario, record = request.scenario, found.record
     counts = record.message_counts
     total = sum(counts.values())
     simulated = record.simulated + sum(probe.simulated for probe in found.probes)
@@ -50,8 +49,11 @@ def result_of(
             "overrides": [msgspec.to_builtins(override) for override in scenario.overrides],
             "thresholds": {name: _finite(value) for name, value in msgspec.structs.asdict(record.thresholds).items()},
         },
-        "faults": [_fault(fault) for fault in faults],
-        "bug": bug,
+        "faults": [_fault(fault) for fault in request.faults],
+        "stack": source.stack,
+        "bug": source.bug,
+        "jitter": request.repeats is not None,
+        "repeats": request.repeats or 1,
         "violations": [violation_json(violation) for violation in record.violations],
         "judgements": [
             {"kind": one.kind, "answer": one.answer.value, "reason": one.reason} for one in record.judgements

@@ -58,6 +58,7 @@ def test_a_parameter_file_that_fits_is_used(tmp_path: Path, scenario: Callable[.
     slow = typed("run", config, "--json", "--stack", tmp_path / "slow.toml").result
     assert plain["verdict"] == slow["verdict"] == "none"
     assert plain["digest"] != slow["digest"]
+    assert (plain["stack"], slow["stack"]) == (None, str(tmp_path / "slow.toml"))
 
 
 def test_a_stack_that_crashes_its_process_is_an_internal_error_not_a_dead_tool(tmp_path: Path) -> None:

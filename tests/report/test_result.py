@@ -24,7 +24,7 @@ from analysis.scenes import (
 )
 from msgspec.structs import replace
 
-from dvca_sumo.analysis.attribution import Attribution, AttributionStoppedError
+from dvca_sumo.analysis.attribution import Attribution, AttributionStoppedError, Request
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.interventions import Fault, planted_fault
 from dvca_sumo.messages import COMPONENTS, Component
@@ -32,6 +32,7 @@ from dvca_sumo.record import Record
 from dvca_sumo.report.result import Timing, result_of
 from dvca_sumo.run import Task
 from dvca_sumo.scenario import Override
+from dvca_sumo.stack.sources import StackSource
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.violations import Category
 
@@ -61,7 +62,7 @@ CONTRACT = {
 
 def told(found: Attribution, faults: tuple[Fault, ...] = ()) -> dict[str, Any]:
     """A result as a reader of the JSON gets it: strict, and of the schema."""
-    text = json.dumps(result_of(SCENARIO, faults, found, TIMING), allow_nan=False)
+    text = json.dumps(result_of(Request(SCENARIO, faults), StackSource(), found, TIMING), allow_nan=False)
     result: dict[str, Any] = json.loads(text)
     VALIDATOR(SCHEMA).validate(result)
     return result
@@ -73,11 +74,19 @@ def perception_missed(answers: Answers | None = None, **more: Any) -> dict[str, 
     return told(attributed(record, given, faults=(FAULTY,), **more), (FAULTY,))
 
 
-@pytest.mark.parametrize("bug", [None, "apollo-6826"])
-def test_the_bug_of_the_build_is_told(bug: str | None) -> None:
-    result = result_of(SCENARIO, (), attributed(drive(), lambda _: SAFE), TIMING, bug)
+@pytest.mark.parametrize(
+    ("source", "repeats", "says"),
+    [
+        (StackSource(), None, {"stack": None, "bug": None, "jitter": False, "repeats": 1}),
+        (StackSource("mine.toml", "apollo-6826"), 1, {"stack": "mine.toml", "bug": "apollo-6826", "repeats": 1}),
+        (StackSource("my_module:my_stack"), 5, {"stack": "my_module:my_stack", "jitter": True, "repeats": 5}),
+    ],
+)
+def test_what_drove_and_in_which_mode_is_told(source: StackSource, repeats: int | None, says: dict[str, Any]) -> None:
+    result = result_of(Request(SCENARIO, (), repeats), source, attributed(drive(), lambda _: SAFE), TIMING)
     VALIDATOR(SCHEMA).validate(result)
-    assert result["bug"] == bug
+    assert result["jitter"] is (repeats is not None)
+    assert {key: result[key] for key in says} == says
 
 
 def test_the_schema_is_a_schema_of_2020_12_and_ships_with_the_package() -> None:
@@ -258,7 +267,9 @@ def test_endless_limits_are_null() -> None:
     mission = breach("no_progress", Category.MISSION, 9.0)
     record = replace(faulty_drive(mission), thresholds=Thresholds(no_progress_time=math.inf, ttc=math.nan))
     found = attributed(record, answering(record, {PERCEPTION: 3}))
-    text = json.dumps(result_of(replace(SCENARIO, end=math.inf), (), found, TIMING), allow_nan=False)
+    text = json.dumps(
+        result_of(Request(replace(SCENARIO, end=math.inf)), StackSource(), found, TIMING), allow_nan=False
+    )
     result = json.loads(text)
     assert result["settled_at"] is None
     assert result["scenario"]["end"] is None
@@ -277,7 +288,8 @@ def test_measured_values_without_a_finite_one_are_null() -> None:
 def test_scenario_overrides_and_faults_are_told() -> None:
     override = Override("begin", None, "5", "asked for")
     faults = (planted_fault("perception.miss:end=4,state=10:5:-1"), planted_fault("planning.speed:error=3"))
-    result = result_of(replace(SCENARIO, overrides=(override,)), faults, attributed(drive(), lambda _: SAFE), TIMING)
+    request = Request(replace(SCENARIO, overrides=(override,)), faults)
+    result = result_of(request, StackSource(), attributed(drive(), lambda _: SAFE), TIMING)
     VALIDATOR(SCHEMA).validate(json.loads(json.dumps(result, allow_nan=False)))
     assert result["scenario"]["overrides"] == [  # type: ignore[index]
         {"option": "begin", "configured": None, "used": "5", "reason": "asked for"}
