@@ -28,7 +28,6 @@ class _Terminal(Progress):
         self._jobs = jobs
         self._begin = time.perf_counter()
         self._factual_wall = 0.0
-        self._probes = 0
 
     def factual(self, record: Record) -> None:
         self._factual_wall = time.perf_counter() - self._begin
@@ -36,10 +35,9 @@ class _Terminal(Progress):
         tell(f"factual run: {said}, {self._factual_wall:.1f} s")
 
     def probe(self, probe: Probe) -> None:
-        self._probes += 1
         ideal = "+".join(component.value for component in probe.question.ideal) or "nothing (the premise)"
         since = f" from #{probe.question.since.index}" if probe.question.since is not None else ""
-        tell(f"probe {self._probes}: ideal {ideal}{since}: {probe.outcome.value}, {probe.wall:.1f} s")
+        tell(f"probe {probe.id}: ideal {ideal}{since}: {probe.outcome.value}, {probe.wall:.1f} s")
 
     def timing(self, engine: str) -> Timing:
         """What it cost up to now."""

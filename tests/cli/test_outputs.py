@@ -1,6 +1,7 @@
 """Where a command's words go: stdout, stderr, the output folder, and nowhere else."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -52,7 +53,9 @@ def test_an_attributed_violation_as_json(tmp_path: Path) -> None:
     assert code == ExitCode.ATTRIBUTED
     assert result["verdict"] == result["component"] == "planning"
     assert [fault["name"] for fault in result["faults"]] == ["planning.path"]
-    assert sum(line.startswith("probe ") for line in progress.splitlines()) == len(result["probes"])
+    told = [re.fullmatch(r"probe (\d+): .*: ([A-Z]+), .*", line) for line in progress.splitlines()]
+    outcomes = {int(line[1]): line[2] for line in told if line is not None}
+    assert outcomes == {probe["id"]: probe["outcome"] for probe in result["probes"]}
     assert [probe["id"] for probe in result["probes"]] == list(range(len(result["probes"])))
     assert sum(count for name, count in result["messages"].items() if name != "total") == result["messages"]["total"]
     text = typed("run", "nets/cs5.sumocfg", "--fault", "planning.path")
