@@ -24,6 +24,23 @@ _GNSS_BIAS = key_of("gnss bias")
 _OBJECT_NOISE = key_of("object noise")
 _CHANCES = key_of("misses and confusions")
 
+# What a parameter may be, where that is not any number from 0 on.
+_SHARE = (0.0, 1.0)
+_ANGLE = (0.0, 6.2832)  # [rad] a full turn, written to four places
+_RANGES = {
+    "gnss_bias_fixes": (1.0, math.inf),
+    "range": (0.1, math.inf),  # [m] distances are told as shares of it
+    "far_range": (0.1, math.inf),  # [m] likewise
+    "field_of_view": _ANGLE,
+    "far_field_of_view": _ANGLE,
+    "visible_share": _SHARE,
+    "heading_sigma_limit": (0.001, math.inf),  # [rad] divided by
+    "miss_near": _SHARE,
+    "miss_far": _SHARE,
+    "confusion_far": _SHARE,
+    "signal_miss": _SHARE,
+}
+
 _CLASSES = len(ObjectClass)
 _BLOCK = 512  # indices whose noise is drawn at once
 
@@ -58,6 +75,14 @@ class SensorConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     confusion_far: float = 0.05  # probability of a wrong class at the limit of the range; 0 at distance 0
     signal_range: float = 100.0  # [m] of signal heads ahead
     signal_miss: float = 0.02  # probability that a head in view is not read
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for a number that makes no sense: which, and what is allowed."""
+        for name, value in msgspec.structs.asdict(self).items():
+            low, high = _RANGES.get(name, (0.0, math.inf))
+            if not (low <= value <= high and math.isfinite(value)):
+                allowed = f"{low:g} or more" if math.isinf(high) else f"{low:g} to {high:g}"
+                raise ValueError(f"{name} is {value:g} (allowed: {allowed})")
 
 
 class Sensors:

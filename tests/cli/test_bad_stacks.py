@@ -26,6 +26,7 @@ BAD_FILES = {
     "unknown field": ("[planning]\nbravery = 2\n", ("bravery", "$.planning")),
     "unknown component": ("[brain]\nsize = 2\n", ("brain",)),
     "wrong type": ('[planning]\nacceleration = "fast"\n', ("`str`", "$.planning.acceleration")),
+    "range that is none": ("[sensors]\nfar_range = -5\n", ("far_range is -5", "allowed: 0.1 or more", "$.sensors")),
     "no TOML": ("planning: fast\n", ("line 1",)),
 }
 

@@ -2,6 +2,7 @@
 
 import math
 
+import msgspec
 import numpy as np
 import numpy.testing as npt
 import pytest
@@ -27,6 +28,21 @@ NOISELESS = SensorConfig(
     corner_sigma=0.0,
     radial_speed_sigma=0.0,
 )
+
+# What makes no sense, and what is said to be allowed.
+SENSELESS: list[tuple[str, float, str]] = [
+    ("far_range", -5.0, "0.1 or more"),
+    ("range", 0.0, "0.1 or more"),
+    ("field_of_view", -0.1, "0 to 6.2832"),
+    ("far_field_of_view", 360.0, "0 to 6.2832"),
+    ("visible_share", 1.5, "0 to 1"),
+    ("miss_far", 15.0, "0 to 1"),
+    ("signal_miss", math.nan, "0 to 1"),
+    ("position_sigma", -0.05, "0 or more"),
+    ("radial_speed_sigma", math.inf, "0 or more"),
+    ("gnss_bias_fixes", 0, "1 or more"),
+    ("heading_sigma_limit", 0.0, "0.001 or more"),
+]
 
 HERE = shapely.Point(0.0, 0.0)
 
@@ -76,6 +92,17 @@ def sensed(moment: Moment, config: SensorConfig = NOISELESS, seed: int = 1, inde
 
 def detected(things: dict[str, Thing], config: SensorConfig = NOISELESS) -> int:
     return len(sensed(moment_of(things), config).boxes)
+
+
+@pytest.mark.parametrize(("name", "value", "allowed"), SENSELESS)
+def test_a_parameter_that_makes_no_sense_is_refused(name: str, value: float, allowed: str) -> None:
+    with pytest.raises(ValueError, match=f"{name} is {value:g} .allowed: {allowed}"):
+        msgspec.structs.replace(SensorConfig(), **{name: value})
+
+
+def test_every_parameter_may_be_0_that_is_no_divisor() -> None:
+    assert NOISELESS.position_sigma == 0.0
+    assert SensorConfig(field_of_view=0.0, visible_share=0.0, occluder_width=0.0, signal_range=0.0).signal_range == 0.0
 
 
 def test_nothing_around_gives_empty_arrays_of_the_right_shapes() -> None:
