@@ -9,7 +9,7 @@ import click
 from dvca_sumo.bench.cases import CasesError
 from dvca_sumo.cli.benching import bench
 from dvca_sumo.cli.listing import faults
-from dvca_sumo.cli.output import ExitCode, tell
+from dvca_sumo.cli.output import ExitCode, OutputError, tell
 from dvca_sumo.cli.running import run
 from dvca_sumo.cli.screening import screen
 from dvca_sumo.engine.processes import stop_when_terminated
@@ -22,6 +22,9 @@ from dvca_sumo.stack.reference import StackError
 from dvca_sumo.store import StoreError
 
 __all__ = ["ExitCode", "main"]
+
+# The user's to mend: what each of them says is enough.
+_TOLD = (ScenarioError, FaultError, StackError, BugError, RoadMapError, CasesError, StoreError, OutputError)
 
 
 @click.group()
@@ -45,7 +48,7 @@ def main() -> NoReturn:
     except click.ClickException as error:
         tell(f"error: {error.format_message()}")
         _leave(ExitCode.USAGE)
-    except (ScenarioError, FaultError, StackError, BugError, RoadMapError, CasesError, StoreError) as error:
+    except _TOLD as error:
         tell(f"error: {error}")
         _leave(ExitCode.BAD_INPUT)
     except RunFailedError as error:

@@ -18,7 +18,7 @@ from dvca_sumo.bench.random_faults import PATIENCE, Drawing, random_scores
 from dvca_sumo.bench.runs import Setting
 from dvca_sumo.bench.score import Score
 from dvca_sumo.bench.tables import json_of, markdown_page, summaries, terminal_text
-from dvca_sumo.cli.output import make_folder, tell, write_whole
+from dvca_sumo.cli.output import deliver, make_folder, tell
 from dvca_sumo.cli.running import REPEATS
 from dvca_sumo.store import Store
 
@@ -113,10 +113,10 @@ def bench(
 
 def _publish(scores: Sequence[Score], output: Path | None, *, as_json: bool) -> None:
     result = json.dumps(json_of(scores), indent=1)
+    files = {}
     if output is not None:
-        write_whole(output / "benchmark.md", markdown_page(scores))
-        write_whole(output / "benchmark.json", result + "\n")
-    click.echo(result if as_json else terminal_text(scores))
+        files = {output / "benchmark.md": markdown_page(scores), output / "benchmark.json": result + "\n"}
+    deliver(result if as_json else terminal_text(scores), files)
 
 
 def _random_scores(

@@ -2,6 +2,7 @@
 
 import click
 
+from dvca_sumo.cli.output import deliver
 from dvca_sumo.interventions import COMMON, Parameter, fault_library
 from dvca_sumo.stack.bugs import BUGS
 
@@ -9,16 +10,15 @@ from dvca_sumo.stack.bugs import BUGS
 @click.command()
 def faults() -> None:
     """List the fault library (name, component, parameters with units), and the real bugs."""
+    lines = []
     for name, entry in fault_library().items():
-        click.echo(f"{name}  ({entry.component.value})\n    {entry.summary}")
-        for key, parameter in entry.parameters.items():
-            click.echo(f"    {_described(key, parameter)}")
-    click.echo("every fault")
-    for key, parameter in COMMON.items():
-        click.echo(f"    {_described(key, parameter)}")
-    click.echo("real bugs, for --bug")
+        lines += [f"{name}  ({entry.component.value})", f"    {entry.summary}"]
+        lines += [f"    {_described(key, parameter)}" for key, parameter in entry.parameters.items()]
+    lines += ["every fault", *(f"    {_described(key, parameter)}" for key, parameter in COMMON.items())]
+    lines.append("real bugs, for --bug")
     for name, bug in BUGS.items():
-        click.echo(f"{name}  ({bug.component.value})\n    {bug.summary}\n    {bug.source}")
+        lines += [f"{name}  ({bug.component.value})", f"    {bug.summary}", f"    {bug.source}"]
+    deliver("\n".join(lines), {})
 
 
 def _described(key: str, parameter: Parameter) -> str:

@@ -1,9 +1,16 @@
 """What every command says and writes, and how it ends."""
 
+import os
+import tempfile
+from collections.abc import Mapping
 from enum import IntEnum
 from pathlib import Path
 
 import click
+
+
+class OutputError(Exception):
+    """What was found cannot be printed or written."""
 
 
 class ExitCode(IntEnum):
@@ -19,24 +26,55 @@ class ExitCode(IntEnum):
 
 
 def tell(line: str) -> None:
-    """One line on standard error."""
-    click.echo(line, err=True)
+    """One line on standard error, as long as anybody listens."""
+    _printed(line, is_error=True)
 
 
 def make_folder(folder: Path) -> None:
-    """The folder that `-o` names, made where it is not there.
+    """The folder that `-o` names, made where it is not there; files can be made in it.
 
     Raises:
-        click.BadParameter: It cannot be.
+        click.BadParameter: It cannot be, or they cannot.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
     except OSError as error:
-        raise click.BadParameter(f"cannot make the folder {folder}: {error.strerror}", param_hint="'-o'") from None
+        said = f"cannot write into the folder {folder}: {error.strerror}"
+        raise click.BadParameter(said, param_hint="'-o'") from None
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Whole or not at all: a reader never sees half a file."""
-    draft = path.with_suffix(".part")
-    draft.write_text(text)
-    draft.replace(path)
+def deliver(text: str, files: Mapping[Path, str]) -> None:
+    """Print the text, then write each file whole or not at all: a reader never sees half of one.
+
+    Who stops reading what is printed loses nothing else by it: the files, the exit code.
+
+    Raises:
+        OutputError: Something of it could not be printed or written; all the rest is.
+    """
+    lost = []
+    unprinted = _printed(text)
+    if unprinted is not None and not isinstance(unprinted, BrokenPipeError):
+        lost.append(f"standard output: {unprinted.strerror}")
+    for path, content in files.items():
+        draft = path.with_suffix(".part")
+        try:
+            draft.write_text(content)
+            draft.replace(path)
+        except OSError as error:
+            lost.append(f"{path}: {error.strerror}")
+    if lost:
+        raise OutputError(f"cannot write {', '.join(lost)}")
+
+
+def _printed(text: str, *, is_error: bool = False) -> OSError | None:
+    """Prints; returns why it could not. After that nothing more is printed there, and nothing fails for it."""
+    try:
+        click.echo(text, err=is_error)
+    except OSError as error:
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, 2 if is_error else 1)  # what is still in the stream's buffer goes there, too
+        os.close(null)
+        return error
+    return None

@@ -12,7 +12,7 @@ from dvca_sumo.analysis.attribution import Attribution, AttributionStoppedError,
 from dvca_sumo.analysis.components import Verdict
 from dvca_sumo.analysis.dtest import Probe
 from dvca_sumo.api import CPUS, FactualDrive, load_scenario
-from dvca_sumo.cli.output import ExitCode, make_folder, tell, write_whole
+from dvca_sumo.cli.output import ExitCode, deliver, make_folder, tell
 from dvca_sumo.record import Record
 from dvca_sumo.report.result import Timing, result_of
 from dvca_sumo.report.terminal import verdict_text
@@ -109,10 +109,9 @@ def run(
 
 
 def _publish(drive: FactualDrive, found: Attribution, timing: Timing, output: Path | None, *, as_json: bool) -> None:
-    result = result_of(drive.request, drive.source, found, timing)
-    if output is not None:
-        write_whole(output / "result.json", json.dumps(result, indent=1) + "\n")
-    click.echo(json.dumps(result, indent=1) if as_json else verdict_text(found, timing, drive.source.bug))
+    result = json.dumps(result_of(drive.request, drive.source, found, timing), indent=1)
+    text = result if as_json else verdict_text(found, timing, drive.source.bug)
+    deliver(text, {} if output is None else {output / "result.json": result + "\n"})
 
 
 def _exit_code(found: Attribution) -> ExitCode:

@@ -1,5 +1,6 @@
 """`dvca-sumo screen`: how well the ADS drives a scenario's own trips, beside SUMO's drivers."""
 
+import contextlib
 import json
 import os
 import sys
@@ -9,7 +10,7 @@ from pathlib import Path
 import click
 
 from dvca_sumo.api import CPUS, load_scenario
-from dvca_sumo.cli.output import ExitCode, make_folder, tell, write_whole
+from dvca_sumo.cli.output import ExitCode, deliver, make_folder, tell
 from dvca_sumo.scenario import AUTO
 from dvca_sumo.screen.driving import Driven, Heard
 from dvca_sumo.screen.screening import Progress, Setting, Stores, screened
@@ -50,7 +51,8 @@ class _Terminal(Progress):
                 left = (wall - started) / max(now - begin, 1.0) * (end - now)
                 hope = f"about {left:.0f} s left" if left > 0.0 else "held up"
                 words = f"  simulation {number}: {now:.0f} s, {done} of {trips} trips over, {hope}\n"
-                os.write(self._descriptor, words.encode())
+                with contextlib.suppress(OSError):  # nobody listens any more
+                    os.write(self._descriptor, words.encode())
 
         return hear
 
@@ -98,10 +100,10 @@ def screen(
         stores = Stores(Store(output / "draws.jsonl", Draw), Store(output / "simulations.jsonl", Driven))
     screening = screened(setting, jobs, stores, _Terminal())
     result, text = json.dumps(json_of(screening), indent=1), terminal_text(screening)
+    files = {}
     if output is not None:
-        write_whole(output / "screening.json", result + "\n")
-        write_whole(output / "screening.txt", text + "\n")
-    click.echo(result if as_json else text)
+        files = {output / "screening.json": result + "\n", output / "screening.txt": text + "\n"}
+    deliver(result if as_json else text, files)
     if has_failed(screening):
         sys.exit(ExitCode.ATTRIBUTED)
     sys.exit(ExitCode.UNRESOLVED if has_gaps(screening) else ExitCode.NO_VIOLATION)

@@ -125,3 +125,18 @@ def test_interrupted_it_tells_what_it_has_found(
     else:
         assert "Injected faults, exact mode: 1 cases" in said.out
     assert (tmp_path / "benchmark.md").exists()
+
+
+def test_a_page_that_cannot_be_written_loses_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "benchmark.md").mkdir()
+    monkeypatch.setattr(sys, "argv", ["dvca-sumo", "bench", "-o", str(tmp_path)])
+    monkeypatch.setattr(benching, "run_benchmark", lambda *_: [score()])
+    with pytest.raises(SystemExit) as left:
+        main()
+    said = capfd.readouterr()
+    assert left.value.code == ExitCode.BAD_INPUT
+    assert "Injected faults, exact mode: 1 cases" in said.out
+    assert said.err == f"error: cannot write {tmp_path}/benchmark.md: Is a directory\n"
+    assert json.loads((tmp_path / "benchmark.json").read_text())["cases"]

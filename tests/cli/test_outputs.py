@@ -1,12 +1,14 @@
 """Where a command's words go: stdout, stderr, the output folder, and nowhere else."""
 
 import json
+import os
 import re
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from command_line import Result, contents, loaded, typed, without_costs
+from command_line import COMMAND, Result, contents, environment, loaded, typed, without_costs
 
 from dvca_sumo.cli import ExitCode
 
@@ -105,3 +107,53 @@ def test_no_scratch_file_outlives_a_command(engine: str, tmp_path: Path, monkeyp
     words = ("--fault", "planning.path", "--engine", engine)
     assert typed("run", "nets/cs5.sumocfg", *words, folder=Path(__file__).parent).code == ExitCode.ATTRIBUTED
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_cannot_be_written_is_printed_all_the_same(tmp_path: Path, scenario: Callable[..., Path]) -> None:
+    (tmp_path / "out" / "result.json").mkdir(parents=True)
+    said = typed("run", scenario(), "--json", "-o", tmp_path / "out")
+    assert said.result["verdict"] == "none"
+    assert said.err.splitlines()[-1] == f"error: cannot write {tmp_path}/out/result.json: Is a directory"
+    assert said.code == ExitCode.BAD_INPUT
+
+
+@pytest.mark.parametrize("is_all_unread", [False, True], ids=["| true", "2>&1 | true"])
+def test_whoever_stops_reading_changes_neither_the_verdict_nor_what_is_kept(
+    tmp_path: Path, scenario: Callable[..., Path], *, is_all_unread: bool
+) -> None:
+    code, told = _unread("run", str(scenario()), "-o", str(tmp_path / "out"), is_all_unread=is_all_unread)
+    assert code == ExitCode.NO_VIOLATION, told
+    assert len(told.splitlines()) == (0 if is_all_unread else 1)  # of the factual run
+    assert loaded((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))["verdict"] == "none"
+
+
+def test_a_list_that_nobody_reads_to_its_end_is_no_error() -> None:
+    assert _unread("faults") == (ExitCode.NO_VIOLATION, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_result_that_there_is_no_room_for_is_told(tmp_path: Path, scenario: Callable[..., Path]) -> None:
+    words = [*COMMAND, "run", str(scenario()), "--json", "-o", str(tmp_path / "out")]
+    with Path("/dev/full").open("w") as full:
+        said = subprocess.run(  # noqa: S603 our own command
+            words, stdout=full, stderr=subprocess.PIPE, text=True, env=environment(), check=False
+        )
+    assert said.stderr.splitlines()[-1] == "error: cannot write standard output: No space left on device"
+    assert said.returncode == ExitCode.BAD_INPUT
+    assert (tmp_path / "out" / "result.json").exists()
+
+
+def _unread(*words: str, is_all_unread: bool = False) -> tuple[int, str]:
+    """Exit code of a command whose output nobody reads, and what it says on standard error if that is read."""
+    read, write = os.pipe()
+    os.close(read)
+    said = subprocess.run(  # noqa: S603 our own command
+        [*COMMAND, *words],
+        stdout=write,
+        stderr=write if is_all_unread else subprocess.PIPE,
+        text=True,
+        env=environment(),
+        check=False,
+    )
+    os.close(write)
+    return said.returncode, said.stderr or ""

@@ -50,6 +50,9 @@ BAD_USAGE = {
     f"run {CS1} --bug": "'--bug' requires an argument",
     f"run {CS1} --bug apollo-6826 --stack mine:stack": "does not go with --stack MODULE:FACTORY",
     f"run {CS1} -o {__file__}": "is a file",
+    f"run {CS1} -o /proc": "cannot write into the folder /proc",
+    "bench -o /proc/self": "cannot write into the folder /proc/self",
+    f"screen {CS1} -o /proc/new": "cannot write into the folder /proc/new",
     "faults more": "unexpected extra argument (more)",
 }
 
