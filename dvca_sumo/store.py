@@ -27,22 +27,24 @@ class Store(Generic[Kept]):
         """Read what is there. What the answers of other questions say is not looked at: other code may have given them.
 
         Raises:
-            StoreError: The file cannot be read or made, or holds something else.
+            StoreError: The file cannot be read, made or written, or holds something else.
         """
         self._path = path
         self._kind = kind
         self._known: dict[str, msgspec.Raw] = {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
+            with path.open("a+b") as file:  # whether it can be added to is known before anything is asked
+                file.seek(0)
+                lines = file.read().splitlines(keepends=True)
+                if lines and not lines[-1].endswith(b"\n"):  # killed while it was written
+                    file.truncate(sum(map(len, lines := lines[:-1])))
         except OSError as error:
-            raise StoreError(f"results cannot be kept in {path}: {error.strerror}") from None
-        if lines and not lines[-1].endswith(b"\n"):  # killed while it was written
-            path.write_bytes(b"".join(lines := lines[:-1]))
+            raise self._unkept(error) from None
         for number, text in enumerate(lines, 1):
             try:
                 line = msgspec.json.decode(text, type=_Line)
-            except (msgspec.DecodeError, msgspec.ValidationError) as error:
+            except msgspec.DecodeError as error:
                 raise StoreError(f"line {number} of {path} is no {kind.__name__}: {error}") from None
             self._known[line.key] = line.value
 
@@ -56,14 +58,24 @@ class Store(Generic[Kept]):
             return None
         try:
             return msgspec.json.decode(self._known[key], type=self._kind)
-        except msgspec.ValidationError as error:
+        except msgspec.DecodeError as error:
             raise StoreError(f"what {self._path} keeps under {key} is no {self._kind.__name__}: {error}") from None
 
     def add(self, key: str, value: Kept) -> None:
-        """Keep an answer: it is on disk when this returns."""
+        """Keep an answer: it is on disk when this returns.
+
+        Raises:
+            StoreError: It cannot be written.
+        """
         self._known[key] = msgspec.Raw(msgspec.json.encode(value))
-        with self._path.open("ab") as file:
-            file.write(msgspec.json.encode(_Line(key, self._known[key])) + b"\n")
+        try:
+            with self._path.open("ab") as file:
+                file.write(msgspec.json.encode(_Line(key, self._known[key])) + b"\n")
+        except OSError as error:
+            raise self._unkept(error) from None
+
+    def _unkept(self, error: OSError) -> StoreError:
+        return StoreError(f"results cannot be kept in {self._path}: {error.strerror}")
 
 
 def key_of(parts: Sequence[object]) -> str:

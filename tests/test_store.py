@@ -56,6 +56,29 @@ def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
         Store(tmp_path / "file" / "scores.jsonl", Score)
 
 
+def test_a_file_that_cannot_be_added_to_is_told_before_anything_is_asked(tmp_path: Path) -> None:
+    (tmp_path / "scores.jsonl").symlink_to(tmp_path / "gone" / "scores.jsonl")
+    with pytest.raises(StoreError, match=r"results cannot be kept in .*scores\.jsonl: No such file"):
+        Store(tmp_path / "scores.jsonl", Score)
+
+
+def test_an_answer_that_cannot_be_kept_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "scores.jsonl"
+    store = Store(path, Score)
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(StoreError, match=r"results cannot be kept in .*scores\.jsonl: Is a directory"):
+        store.add("a", score())
+
+
+def test_a_kept_answer_that_is_no_text_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "scores.jsonl"
+    Store(path, Score).add("a", score("perception.miss/cs1"))
+    path.write_bytes(path.read_bytes().replace(b"perception.miss/cs1", b"perception.miss/\xff"))
+    with pytest.raises(StoreError, match=r"keeps under a is no Score: Invalid UTF-8"):
+        Store(path, Score).find("a")
+
+
 def test_equal_questions_have_equal_keys_and_others_others() -> None:
     assert key_of([1, "a"]) == key_of([1, "a"])
     assert len({key_of([1, "a"]), key_of(["a", 1]), key_of([1, "b"])}) == 3
