@@ -8,6 +8,8 @@ from typing import Generic, TypeVar
 
 import msgspec
 
+from dvca_sumo.installation import folder
+
 Kept = TypeVar("Kept")
 
 
@@ -79,16 +81,17 @@ class Store(Generic[Kept]):
 
 
 def key_of(parts: Sequence[object]) -> str:
-    """One key for equal questions to the same code, on every machine: what other code has found is not taken for it."""
+    """One key for equal questions to the same code and faults, on every machine: what others found is not taken."""
     return _digest(msgspec.json.encode([parts, _sources()]))
 
 
 @cache
 def _sources() -> str:
-    """Of this package's code; its version does not change with each edit."""
-    folder = Path(__file__).parent
-    files = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.py"))
-    return _digest(b"".join(b"%s\0%s\0" % (name.encode(), (folder / name).read_bytes()) for name in files))
+    """Of this package's code, and of the fault library; the version does not change with each edit."""
+    code = Path(__file__).parent
+    files = {path.relative_to(code).as_posix(): path for path in code.rglob("*.py")}
+    files |= {f"faults/{path.name}": path for path in folder("faults").glob("*.toml")}
+    return _digest(b"".join(b"%s\0%s\0" % (name.encode(), files[name].read_bytes()) for name in sorted(files)))
 
 
 def _digest(content: bytes) -> str:

@@ -10,6 +10,7 @@ from bench.scores import score
 
 import dvca_sumo
 from dvca_sumo.bench.score import Score
+from dvca_sumo.installation import folder
 from dvca_sumo.store import Store, StoreError, key_of
 
 
@@ -84,9 +85,11 @@ def test_equal_questions_have_equal_keys_and_others_others() -> None:
     assert len({key_of([1, "a"]), key_of(["a", 1]), key_of([1, "b"])}) == 3
 
 
-def test_what_other_code_has_found_is_not_believed(tmp_path: Path) -> None:
-    """Who edits the driver and asks again in the same folder gets new answers."""
+@pytest.mark.parametrize("edited", ["dvca_sumo/stack/planning/planner.py", "faults/perception.miss.toml"])
+def test_what_other_code_or_another_fault_has_found_is_not_believed(edited: str, tmp_path: Path) -> None:
+    """Who edits the driver or a fault and asks again in the same folder gets new answers."""
     copy = tmp_path / "dvca_sumo"
+    shutil.copytree(folder("faults"), tmp_path / "faults")
     shutil.copytree(Path(dvca_sumo.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
 
     def key() -> str:
@@ -96,6 +99,6 @@ def test_what_other_code_has_found_is_not_believed(tmp_path: Path) -> None:
 
     before = key()
     assert key() == before
-    planner = copy / "stack" / "planning" / "planner.py"
-    planner.write_text(planner.read_text() + "\n")
+    with (tmp_path / edited).open("a") as file:
+        file.write("\n")
     assert key() != before
