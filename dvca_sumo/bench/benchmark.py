@@ -9,7 +9,7 @@ from dvca_sumo.bench.score import FAILED, Score
 from dvca_sumo.report.result import versions
 from dvca_sumo.store import Store, key_of
 
-OnScore = Callable[[Score, int], None]  # a case's score, and how many are left
+OnScore = Callable[[Score, int, bool], None]  # a case's score, how many are left, whether it was not known before
 
 
 def run_benchmark(
@@ -17,12 +17,14 @@ def run_benchmark(
 ) -> list[Score]:
     """The scores of all cases under each setting, in their order.
 
-    What the store holds already is not run again; what is found is kept there at once. A case that could
-    not be analysed is not kept: the next run tries it again.
+    What the store holds already is not run again, and told first; what is found is kept there at once. A case
+    that could not be analysed is not kept: the next run tries it again.
     """
     asked = [(case if setting.repeats is None else case.loosened(), setting) for setting in settings for case in cases]
     known = {row: score for row, pair in enumerate(asked) if store and (score := store.find(question_key(*pair)))}
     left = len(asked) - len(known)
+    for score in known.values():
+        on_score(score, left, False)
     for setting in settings:
         rows = [row for row, pair in enumerate(asked) if pair[1] is setting and row not in known]
         for number, score in analysed([asked[row][0] for row in rows], setting, jobs):
@@ -30,7 +32,7 @@ def run_benchmark(
             left -= 1
             if store is not None and score.verdict != FAILED:
                 store.add(question_key(*asked[rows[number]]), score)
-            on_score(score, left)
+            on_score(score, left, True)
     return [known[row] for row in range(len(asked))]
 
 

@@ -72,11 +72,17 @@ def random_scores(
     """The scores of the first `drawing.wanted` draws that violate, in the order of drawing; and how many were drawn.
 
     They are fewer when `PATIENCE` draws in a row do no harm. What the store holds is not run again, and
-    harmless draws are kept there as well.
+    harmless draws are kept there as well. Of so many is told only when no earlier draw is open any more.
     """
     wanted = drawing.wanted
     answers: dict[int, Score] = {}
     begun: list[tuple[int, Case]] = []
+
+    def take(number: int, score: Score, *, is_new: bool) -> None:
+        answers[number] = score
+        left = max(wanted - sum(map(is_violating, answers.values())), 0)
+        if is_violating(score) and (left > 0 or _settled(answers, wanted)[1]):
+            on_score(score, left, is_new)
 
     def cases() -> Iterator[Case]:
         for number in itertools.count():
@@ -88,15 +94,13 @@ def random_scores(
                 begun.append((number, case))
                 yield case
             else:
-                answers[number] = known
+                take(number, known, is_new=False)
 
     for row, score in analysed(cases(), setting, jobs):
         number, case = begun[row]
-        answers[number] = score
         if store is not None and score.verdict != FAILED:
             store.add(question_key(case, setting), score)
-        if is_violating(score):
-            on_score(score, max(wanted - sum(map(is_violating, answers.values())), 0))
+        take(number, score, is_new=True)
     settled, _ = _settled(answers, wanted)
     return [score for score in settled if is_violating(score)], len(settled)
 

@@ -18,6 +18,17 @@ _Render = Callable[[str, Rows], str]
 _TITLES = {"injected": "Injected faults", "real-bugs": "Real bugs", "random": "Random faults"}
 
 
+class Gap(msgspec.Struct, frozen=True):
+    """Cases that were asked for, and are not there."""
+
+    missing: int
+    reason: str
+
+    def told(self, scores: Sequence[Score]) -> str:
+        """The same in a line, of those that are there."""
+        return f"NOT WHOLE: {len(scores)} of {len(scores) + self.missing} cases, {self.missing} missing: {self.reason}"
+
+
 def summaries(scores: Sequence[Score]) -> list[Summary]:
     """One for each suite and mode, in the order of their first scores."""
     groups: dict[tuple[str, str], list[Score]] = {}
@@ -26,28 +37,29 @@ def summaries(scores: Sequence[Score]) -> list[Summary]:
     return [summary_of(group) for group in groups.values()]
 
 
-def json_of(scores: Sequence[Score]) -> Json:
+def json_of(scores: Sequence[Score], gap: Gap | None = None) -> Json:
     """The scores and what they come to, of JSON types only."""
     return {
         "schema": 1,
         "cases": msgspec.to_builtins(list(scores)),
+        "missing": 0 if gap is None else gap.missing,
         "summary": msgspec.to_builtins(summaries(scores)),
         "versions": versions(),
     }
 
 
-def terminal_text(scores: Sequence[Score]) -> str:
+def terminal_text(scores: Sequence[Score], gap: Gap | None = None) -> str:
     """The tables for a terminal."""
-    return _document(scores, _plain)
+    return _document(scores, gap, _plain)
 
 
-def markdown_page(scores: Sequence[Score]) -> str:
+def markdown_page(scores: Sequence[Score], gap: Gap | None = None) -> str:
     """The tables as a page of their own."""
-    return "# Benchmark\n\n" + _document(scores, _markdown) + "\n"
+    return "# Benchmark\n\n" + _document(scores, gap, _markdown) + "\n"
 
 
-def _document(scores: Sequence[Score], render: _Render) -> str:
-    parts = []
+def _document(scores: Sequence[Score], gap: Gap | None, render: _Render) -> str:
+    parts = [] if gap is None else [gap.told(scores)]
     for summary in summaries(scores):
         group = [score for score in scores if (score.suite, score.mode) == (summary.suite, summary.mode)]
         title = f"{_TITLES[summary.suite]}, {summary.mode} mode: {summary.cases} cases"

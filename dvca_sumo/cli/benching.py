@@ -17,23 +17,27 @@ from dvca_sumo.bench.places import BUILT_IN, HealthyDrive, Place, healthy_drives
 from dvca_sumo.bench.random_faults import PATIENCE, Drawing, random_scores
 from dvca_sumo.bench.runs import Setting
 from dvca_sumo.bench.score import Score
-from dvca_sumo.bench.tables import json_of, markdown_page, summaries, terminal_text
+from dvca_sumo.bench.tables import Gap, json_of, markdown_page, summaries, terminal_text
 from dvca_sumo.cli.output import deliver, make_folder, tell
 from dvca_sumo.cli.running import REPEATS
 from dvca_sumo.store import Store
 
 
 class _Countdown:
-    """Progress on standard error: each score, and about how long the rest will take."""
+    """Progress on standard error: each new score, and about how long the rest will take."""
 
     def __init__(self) -> None:
         self._begin = time.perf_counter()
+        self._new = 0
         self.heard: list[Score] = []
 
-    def score(self, score: Score, left: int) -> None:
+    def score(self, score: Score, left: int, is_new: bool) -> None:  # noqa: FBT001 - as its callers call it
         """Hear of one more."""
         self.heard.append(score)
-        remaining = (time.perf_counter() - self._begin) / len(self.heard) * left
+        if not is_new:
+            return
+        self._new += 1
+        remaining = (time.perf_counter() - self._begin) / self._new * left
         said = "right" if score.component_success and score.message_success else "WRONG"
         tell(f"{score.name} ({score.mode}): {said}; {left} left, about {remaining:.0f} s")
 
@@ -74,7 +78,8 @@ def bench(
     An interrupted benchmark goes on where it stopped when it is given the same folder again.
 
     \b
-    Exit codes: 0 all checks hold; 1 some do not; 2 usage; 3 bad input; 70 internal error; 130 interrupted.
+    Exit codes: 0 all checks hold; 1 some do not, or too few random faults violate; 2 usage; 3 bad input;
+    70 internal error; 130 interrupted.
     """  # noqa: D301 - click wants the very character, not its escape
     if repeats is not None and not jitter:
         raise click.UsageError("--repeats goes with --jitter: in exact mode every run is the same")
@@ -90,33 +95,43 @@ def bench(
     settings += [msgspec.structs.replace(settings[0], repeats=repeats or REPEATS)] if jitter else []
     store = None if output is None else Store(output / "scores.jsonl", Score)
     countdown = _Countdown()
+    cases = [case for name, cases_of in WRITTEN.items() if suite in (None, name, "all") for case in cases_of()]
+    asked = (len(cases) if wanted is None else wanted) * len(settings)
+    scores: list[Score] = []
     try:
         if wanted is None:
-            cases = [case for name, cases_of in WRITTEN.items() if suite in (None, name, "all") for case in cases_of()]
             scores = run_benchmark(cases, settings, jobs, store, countdown.score)
         else:
             places = BUILT_IN if sumocfg is None else places_of(sumocfg, ego, begin)
             drives = None if output is None else Store(output / "healthy.jsonl", HealthyDrive)
             drawing = Drawing(1 if seed is None else seed, wanted)
             stores = (store, drives)
-            scores = [
-                one for each in settings for one in _random_scores(drawing, places, each, jobs, stores, countdown)
-            ]
+            for each in settings:
+                scores += _random_scores(drawing, places, each, jobs, stores, countdown)
+                countdown.heard.clear()
     except KeyboardInterrupt:
-        if countdown.heard:
-            _publish(countdown.heard, output, as_json=as_json)
+        scores += countdown.heard
+        if scores:
+            _publish(scores, Gap(asked - len(scores), "interrupted"), output, as_json=as_json)
         raise
-    _publish(scores, output, as_json=as_json)
-    is_whole = wanted is None or len(scores) == wanted * len(settings)
-    sys.exit(0 if is_whole and all(check.holds for one in summaries(scores) for check in one.checks) else 1)
+    gap = _too_few(len(scores), asked) if wanted is not None else None
+    _publish(scores, gap, output, as_json=as_json)
+    sys.exit(0 if gap is None and all(check.holds for one in summaries(scores) for check in one.checks) else 1)
 
 
-def _publish(scores: Sequence[Score], output: Path | None, *, as_json: bool) -> None:
-    result = json.dumps(json_of(scores), indent=1)
+def _too_few(found: int, asked: int) -> Gap | None:
+    reason = f"drawing stopped where none of the last {PATIENCE} faults violated"
+    return Gap(asked - found, reason) if found < asked else None
+
+
+def _publish(scores: Sequence[Score], gap: Gap | None, output: Path | None, *, as_json: bool) -> None:
+    result = json.dumps(json_of(scores, gap), indent=1)
     files = {}
     if output is not None:
-        files = {output / "benchmark.md": markdown_page(scores), output / "benchmark.json": result + "\n"}
-    deliver(result if as_json else terminal_text(scores), files)
+        files = {output / "benchmark.md": markdown_page(scores, gap), output / "benchmark.json": result + "\n"}
+    deliver(result if as_json else terminal_text(scores, gap), files)
+    if gap is not None:
+        tell(gap.told(scores))
 
 
 def _random_scores(
@@ -136,8 +151,6 @@ def _random_scores(
     tell(f"{len(clean)} clean drive(s) to plant faults in ({setting.mode} mode)")
     scores, drawn = random_scores(drawing, clean, setting, jobs, store, countdown.score)
     tell(f"{len(scores)} of {drawn} drawn faults violate")
-    if len(scores) < drawing.wanted:
-        tell(f"drawing stopped: none of the last {PATIENCE} violates; {drawing.wanted} were asked for")
     return scores
 
 

@@ -339,7 +339,7 @@ def test_what_is_kept_without_baselines_does_not_answer_for_them(
     monkeypatch.setattr(benchmark, "analysed", noting)
     case = Case("injected", "a", "nets/cs1.sumocfg", PERCEPTION, fault="perception.miss")
     for setting in (Setting(), Setting(baselines=("paper",)), Setting(baselines=("paper",))):
-        benchmark.run_benchmark([case], [setting], 1, Store(tmp_path / "s", Score), lambda _score, _left: None)
+        benchmark.run_benchmark([case], [setting], 1, Store(tmp_path / "s", Score), lambda *_: None)
     assert [setting.baselines for setting in asked if setting.baselines] == [("paper",)]
 
 

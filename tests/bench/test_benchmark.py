@@ -11,7 +11,7 @@ from small_scenarios import scenario_file
 from bench.scores import score
 from dvca_sumo.bench import benchmark
 from dvca_sumo.bench.benchmark import run_benchmark
-from dvca_sumo.bench.cases import Case
+from dvca_sumo.bench.cases import Case, injected_cases, real_bug_cases
 from dvca_sumo.bench.runs import Setting, analysed
 from dvca_sumo.bench.score import FAILED, Score
 from dvca_sumo.cli import ExitCode, benching, main
@@ -24,7 +24,7 @@ CASES = [
 ]
 
 
-def ignore(_score: Score, _left: int) -> None:
+def ignore(*_words: object) -> None:
     """Nobody watches."""
 
 
@@ -110,7 +110,7 @@ def test_interrupted_it_tells_what_it_has_found(
     form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def dying(cases, settings, jobs, store, on_score):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202, ARG001
-        on_score(score("perception.miss/cs1"), 38)
+        on_score(score("perception.miss/cs1"), 38, True)
         raise KeyboardInterrupt
 
     words = ["dvca-sumo", "bench", "-o", str(tmp_path), *(["--json"] if form == "json" else [])]
@@ -120,11 +120,52 @@ def test_interrupted_it_tells_what_it_has_found(
         main()
     said = capfd.readouterr()
     assert left.value.code == ExitCode.INTERRUPTED
+    missing = len(injected_cases()) + len(real_bug_cases()) - 1
+    told = f"NOT WHOLE: 1 of {missing + 1} cases, {missing} missing: interrupted"
     if form == "json":
         assert [case["name"] for case in json.loads(said.out)["cases"]] == ["perception.miss/cs1"]
+        assert json.loads(said.out)["missing"] == missing
     else:
-        assert "Injected faults, exact mode: 1 cases" in said.out
-    assert (tmp_path / "benchmark.md").exists()
+        assert said.out.startswith(f"{told}\n\nInjected faults, exact mode: 1 cases")
+    assert (tmp_path / "benchmark.md").read_text().startswith(f"# Benchmark\n\n{told}\n")
+    assert [line for line in said.err.splitlines() if line][-2:] == [told, "interrupted"]
+
+
+def test_interrupted_it_tells_what_was_kept_before_as_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Whether it finds anything new or not, the page never holds less than it did."""
+    more = iter([2, 0, 1])
+
+    def dying(cases, setting, jobs):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202, ARG001
+        yield from ((row, score(case.name)) for row, case in zip(range(next(more)), cases, strict=False))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(benchmark, "analysed", dying)
+    monkeypatch.setattr(sys, "argv", ["dvca-sumo", "bench", "--suite", "real-bugs", "-o", str(tmp_path)])
+    for known, new in ((0, 2), (2, 0), (2, 1)):
+        with pytest.raises(SystemExit):
+            main()
+        said = capfd.readouterr()
+        assert said.out.startswith(f"NOT WHOLE: {known + new} of {len(real_bug_cases())} cases")
+        assert len(json.loads((tmp_path / "benchmark.json").read_text())["cases"]) == known + new
+        assert said.err.count(" left, about ") == new
+
+
+def test_too_few_random_faults_are_no_success_and_the_page_says_why(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["dvca-sumo", "bench", "--random", "3"])
+    monkeypatch.setattr(benching, "healthy_drives", lambda *_: [])
+    monkeypatch.setattr(benching, "random_scores", lambda *_: ([score(suite="random")], 101))
+    with pytest.raises(SystemExit) as left:
+        main()
+    said = capfd.readouterr()
+    told = "NOT WHOLE: 1 of 3 cases, 2 missing: drawing stopped where none of the last 100 faults violated"
+    assert left.value.code == 1
+    assert said.out.startswith(told)
+    assert "FAILS" not in said.out
+    assert said.err.splitlines()[-1] == told
 
 
 def test_a_page_that_cannot_be_written_loses_nothing_else(

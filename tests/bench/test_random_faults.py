@@ -26,7 +26,7 @@ SETTING = Setting(has_controls=False)
 DRIVES = [HealthyDrive(place, "", 40.0, ("lead", "person:walker")) for place in BUILT_IN]
 
 
-def _ignored(score: Score, left: int) -> None:
+def _ignored(*_words: object) -> None:
     """Hear of nothing."""
 
 
@@ -111,6 +111,28 @@ def test_drawing_stops_when_nothing_violates_any_more(monkeypatch: pytest.Monkey
     scores, drawn = random_scores(Drawing(1, 2), DRIVES, SETTING, 1, None, _ignored)
     assert _numbers(scores) == [4]
     assert drawn == len(asked) == 5 + random_faults.PATIENCE
+
+
+@pytest.mark.parametrize("at_once", [1, 5])
+def test_what_is_told_is_all_of_it_only_when_drawing_is_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: int
+) -> None:
+    """Who is interrupted before has heard of fewer than asked for; what is known already is told again."""
+    asked = _canned(monkeypatch, lambda number: number != 0, at_once)
+    heard: list[bool] = []
+
+    def hear(_score: Score, left: int, is_new: bool) -> None:  # noqa: FBT001
+        heard.append(is_new)
+        assert left == max(wanted - len(heard), 0)
+        assert left > 0 or set(asked) >= set(range(wanted + 1))
+
+    for wanted in (2, 9):
+        heard.clear()
+        store = Store(tmp_path / "scores", Score)
+        scores, _ = random_scores(Drawing(1, wanted), DRIVES, SETTING, at_once, store, hear)
+        assert _numbers(scores) == list(range(1, wanted + 1))
+        assert wanted - 1 <= len(heard) <= wanted
+    assert (heard[0], heard[-1]) == (False, True)
 
 
 def test_a_draw_that_could_not_be_run_is_a_case_and_wrong() -> None:

@@ -61,3 +61,4 @@ def test_the_json_holds_what_the_contract_names_and_nothing_that_json_has_not() 
     assert again["schema"] == 1
     assert set(again["cases"][0]) >= CONTRACT
     assert again["summary"][0]["cases"] == 2
+    assert again["missing"] == 0

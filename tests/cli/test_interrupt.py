@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from command_line import COMMAND, environment, loaded
 
+from dvca_sumo.bench.cases import real_bug_cases
 from dvca_sumo.cli import ExitCode
 
 
@@ -67,5 +68,6 @@ def test_an_interrupted_benchmark_prints_and_keeps_the_cases_it_has(tmp_path: Pa
     assert err.splitlines()[-1] == "interrupted"
     partial = json.loads(out)
     assert [case["suite"] for case in partial["cases"]] == ["real-bugs"]
+    assert partial["missing"] == len(real_bug_cases()) - 1
     assert json.loads((tmp_path / "out" / "benchmark.json").read_text(encoding="utf-8")) == partial
     assert len((tmp_path / "out" / "scores.jsonl").read_text(encoding="utf-8").splitlines()) == 1
