@@ -86,7 +86,7 @@ def screen(
     few) and can be driven, and SUMO's own driver is over it before the end, and well before an ego's patience is; stops
     on the way are made by nobody who drives it.
     An interrupted screening goes on where it stopped when it is given the same folder again; of a stack of your own,
-    while its Python files are the same.
+    while its Python files are the same. Of a part of the trips nothing is printed.
 
     \b
     Exit codes: 0 nothing violated by the ADS's own doing; 1 something was; 2 usage; 3 bad input;
@@ -98,7 +98,14 @@ def screen(
     stores = Stores()
     if output is not None:
         stores = Stores(Store(output / "draws.jsonl", Draw), Store(output / "simulations.jsonl", Driven))
-    screening = screened(setting, jobs, stores, _Terminal())
+    try:
+        screening = screened(setting, jobs, stores, _Terminal())
+    except KeyboardInterrupt:  # the rates of whichever trips are over would mislead
+        if output is None:
+            tell("nothing is kept of what was simulated; with -o FOLDER it is, to go on from there")
+        else:
+            tell(f"simulations that are over are kept in {output}: the same command goes on from there")
+        raise
     result, text = json.dumps(json_of(screening), indent=1), terminal_text(screening)
     files = {}
     if output is not None:

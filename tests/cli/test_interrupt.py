@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
-from command_line import COMMAND, environment, loaded
+from command_line import COMMAND, Said, environment, loaded
 
 from dvca_sumo.bench.cases import real_bug_cases
-from dvca_sumo.cli import ExitCode
+from dvca_sumo.cli import ExitCode, screening
 
 
 def interrupted(
@@ -71,3 +71,19 @@ def test_an_interrupted_benchmark_prints_and_keeps_the_cases_it_has(tmp_path: Pa
     assert partial["missing"] == len(real_bug_cases()) - 1
     assert json.loads((tmp_path / "out" / "benchmark.json").read_text(encoding="utf-8")) == partial
     assert len((tmp_path / "out" / "scores.jsonl").read_text(encoding="utf-8").splitlines()) == 1
+
+
+@pytest.mark.parametrize("is_kept", [True, False])
+def test_an_interrupted_screening_prints_no_rates_but_says_what_is_kept(
+    called: Callable[..., Said], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, is_kept: bool
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(screening, "screened", interrupt)
+    said = called("screen", "nets/cs1.sumocfg", *(["-o", str(tmp_path)] if is_kept else []))
+    assert (said.code, said.out) == (ExitCode.INTERRUPTED, "")
+    told, last = (line for line in said.err.splitlines() if line)
+    assert last == "interrupted"
+    assert [word in told for word in (f"kept in {tmp_path}", "goes on from there")] == [is_kept] * 2
+    assert [word in told for word in ("nothing is kept", "with -o")] == [not is_kept] * 2
