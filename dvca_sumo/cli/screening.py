@@ -90,7 +90,8 @@ def screen(
 
     \b
     Exit codes: 0 nothing violated by the ADS's own doing; 1 something was; 2 usage; 3 bad input;
-    4 nothing was, but trips could not be driven, or not to their end; 70 internal error; 130 interrupted.
+    4 nothing was, but trips could not be driven, or not to their end, or an oracle could not tell;
+    70 internal error; 130 interrupted.
     """  # noqa: D301 - click wants the very character, not its escape
     if output is not None:
         make_folder(output)

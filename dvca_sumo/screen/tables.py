@@ -1,13 +1,15 @@
 """A screening as data and as text."""
 
 import shlex
+from collections import Counter
 from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
 
 import msgspec
 
 from dvca_sumo.intervals import Rate, Share
 from dvca_sumo.report.result import Json, versions, violation_json
-from dvca_sumo.screen.judging import Judged
+from dvca_sumo.screen.judging import Fault, Judged
 from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.screening import Screening, Setting
 from dvca_sumo.screen.summary import DriverSummary, Quartiles, summary_of
@@ -55,9 +57,9 @@ def has_failed(screening: Screening) -> bool:
 
 
 def has_gaps(screening: Screening) -> bool:
-    """Whether a trip could not be driven, or not to its end."""
+    """Whether a trip could not be driven, or not to its end, or an oracle could not tell."""
     untold = (TripOutcome.NOT_DRIVEN, TripOutcome.ABORTED, TripOutcome.CUT)
-    return any(trip.outcome in untold for trip in screening.ads)
+    return any(trip.outcome in untold or trip.unknown for trip in screening.ads)
 
 
 def terminal_text(screening: Screening) -> str:
@@ -73,15 +75,27 @@ def terminal_text(screening: Screening) -> str:
     ]
     listed = [_line(trip, one, screening.setting) for trip in screening.ads for one in trip.violations]
     if listed:
+        if any(one.fault is not Fault.DRIVER for trip in screening.ads for one in trip.violations):
+            listed.append(
+                "`run` does not ask whose doing a violation is: it looks for a component in those of others, too."
+            )
         parts.append("Violations of the ADS, and how to see each\n" + "\n".join(listed))
+    drivers = (("ADS", screening.ads), ("SUMO's driver", screening.sumo_driver))
     lost = [
         f"{driver} {trip.ego}: {trip.outcome.value}: {trip.reason}"
-        for driver, trips in (("ADS", screening.ads), ("SUMO's driver", screening.sumo_driver))
+        for driver, trips in drivers
         for trip in trips
         if trip.reason
     ]
     if lost:
         parts.append("Trips that were not driven, or not to their end\n" + "\n".join(lost))
+    untold = [
+        f"{driver}: {oracle} on {count} of {len(trips)}"
+        for driver, trips in drivers
+        for oracle, count in Counter(oracle for trip in trips for oracle in trip.unknown).items()
+    ]
+    if untold:
+        parts.append("Oracles that could not tell, and on how many trips\n" + "\n".join(untold))
     return "\n\n".join(parts)
 
 
@@ -92,7 +106,10 @@ def command(setting: Setting, ego: str) -> str:
     words += ["--seed", str(scenario.seed), "--begin", f"{scenario.begin:.12g}"]
     if scenario.end is not None and scenario.end != scenario.configured_end:
         words += ["--end", f"{scenario.end:.12g}"]
-    return shlex.join([*words, *(["--stack", setting.source.stack] if setting.source.stack else [])])
+    stack = setting.source.stack
+    if stack is not None:
+        words += ["--stack", str(Path(stack).resolve()) if setting.source.is_reference else stack]
+    return shlex.join(words)
 
 
 def _summaries(screening: Screening) -> tuple[DriverSummary, DriverSummary]:

@@ -149,12 +149,44 @@ def test_trips_that_the_simulator_ended_or_the_scenario_cut_off_are_counted_apar
     assert (found.completed.count, found.completed.total) == (1, 3)
 
 
+def _untold(screening: Screening, unknown: tuple[str, ...]) -> Screening:
+    """The screening, had these oracles not been able to tell."""
+    trips = tuple(msgspec.structs.replace(trip, unknown=unknown) for trip in screening.ads)
+    return msgspec.structs.replace(screening, ads=trips)
+
+
 def test_a_trip_that_was_cut_off_is_a_gap_and_the_text_says_why(reckless: Screening) -> None:
-    assert not has_gaps(reckless)
-    cut = msgspec.structs.replace(reckless.ads[0], outcome=TripOutcome.CUT, reason="the scenario ended at 100 s")
-    screening = msgspec.structs.replace(reckless, ads=(cut, *reckless.ads[1:]))
+    whole = _untold(reckless, ())
+    assert not has_gaps(whole)
+    cut = msgspec.structs.replace(whole.ads[0], outcome=TripOutcome.CUT, reason="the scenario ended at 100 s")
+    screening = msgspec.structs.replace(whole, ads=(cut, *whole.ads[1:]))
     assert has_gaps(screening)
     assert f"ADS {cut.ego}: cut: the scenario ended at 100 s" in terminal_text(screening)
+
+
+def test_what_an_oracle_could_not_tell_is_a_gap_and_the_text_says_on_how_many_trips(reckless: Screening) -> None:
+    screening = _untold(reckless, ("destination",))
+    assert has_gaps(screening)
+    said = "Oracles that could not tell, and on how many trips\nADS: destination on 2 of 2"
+    assert terminal_text(screening).endswith(said)
+    assert "could not tell" not in terminal_text(_untold(reckless, ()))
+
+
+def test_where_a_violation_is_not_the_drivers_the_text_says_that_run_does_not_ask(reckless: Screening) -> None:
+    said = "`run` does not ask whose doing a violation is"
+    first, *others = reckless.ads
+    excused = tuple(msgspec.structs.replace(one, fault=Fault.OTHER) for one in first.violations)
+    screening = msgspec.structs.replace(reckless, ads=(msgspec.structs.replace(first, violations=excused), *others))
+    assert said in terminal_text(screening)
+    assert said not in terminal_text(reckless)
+
+
+def test_a_file_of_parameters_is_found_from_any_folder(
+    tmp_path: Path, reckless: Screening, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    setting = msgspec.structs.replace(reckless.setting, source=StackSource("short.toml"))
+    assert command(setting, "first").endswith(f" --stack {tmp_path / 'short.toml'}")
 
 
 def test_the_text_puts_both_drivers_side_by_side(reckless: Screening) -> None:
