@@ -17,7 +17,7 @@ from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.world import Entry, VehicleLimits, World, shape_of
 
 _SHORTEST_AUTO_TRIP = 500.0  # [m]
-# Longest allowed duration of a trip, unless the scenario ends before.
+# Longest allowed duration of a trip.
 _PATIENCE = 3.0  # times the free-flow travel time ...
 _PATIENCE_BASE = 90.0  # [s] ... plus this
 _FIRST_BRAKING = 0.3  # [s] after its departure no ego has its full braking
@@ -88,9 +88,13 @@ class Departing:
         return Judging(judges(places, thresholds), thresholds, places)
 
     def latest(self, entry: Entry, route: Route) -> float:
-        """When a trip ends at the latest [s]: at the scenario's end, or when patience does."""
-        end = math.inf if self._scenario.end is None else self._scenario.end
-        return min(entry.time + patience(free_flow(route)), end)
+        """When a trip has to be over [s]: when patience is, or by the scenario's end, if nobody would be late for that.
+
+        Where the end comes sooner than who drives at the speed limits, it only cuts the trip off.
+        """
+        freely, end = free_flow(route), self._scenario.end
+        patient = entry.time + patience(freely)
+        return patient if end is None or entry.time + freely > end else min(patient, end)
 
     def drive(self, entry: Entry, task: Task, world: World, *, is_whole: bool = True) -> Drive:
         """Adopt a vehicle that has just departed; see `Drive` for `is_whole`.

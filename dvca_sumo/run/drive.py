@@ -74,7 +74,7 @@ class Drive:
     def __init__(
         self, ego: Ego, stack: Stack, judging: Judging, task: Task, latest: float, *, is_whole: bool = True
     ) -> None:
-        """A drive that ends at `latest` [s] unless its task stops it earlier.
+        """A drive that is late at `latest` [s], unless it is cut before by its task or the scenario's end.
 
         Unless it `is_whole`, every step forgets what the one before left: there is an outcome, but no record.
         """
@@ -86,6 +86,7 @@ class Drive:
         self._stack = stack
         self._task = task
         self._latest = latest
+        self._end = math.inf if task.scenario.end is None else task.scenario.end
         self._due = _due(task)
         self._intervening = Intervening(task.interventions)
         self._channels = Channels()
@@ -292,7 +293,7 @@ class Drive:
             return Ending.TIME_OVER
         if moment.time >= rule.settled - TICK and self.ego.station() > rule.place:
             return Ending.CUT
-        stop = min(rule.at, self._breach + rule.after_violation, self._contact + rule.after_contact)
+        stop = min(rule.at, self._end, self._breach + rule.after_violation, self._contact + rule.after_contact)
         return Ending.CUT if moment.time >= stop - TICK else None
 
 

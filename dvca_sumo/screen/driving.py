@@ -1,13 +1,12 @@
 """Trips driven by the ADS, several at once in one simulation."""
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
 import msgspec
 
 from dvca_sumo.engine.replay import roadmap
-from dvca_sumo.run import Departing, Drive, Over, Simulation, StopRule, Task, built_here, opened
+from dvca_sumo.run import Departing, Drive, Over, Simulation, Task, built_here, opened
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.screen.neighbours import Neighbourhood, Neighbours
 from dvca_sumo.screen.queues import Queues
@@ -72,7 +71,6 @@ class _Fleet:
         self._simulation = Simulation(world, scenario.begin)
         self._awaited = {trip.ego: trip for trip in trips}
         self._concurrent = concurrent
-        self._stop = StopRule(at=math.inf if scenario.end is None else scenario.end)
         self._watches: dict[str, Watch] = {}  # by ego
         self._results: list[TripResult] = []
         self._crowded_out: list[str] = []
@@ -102,7 +100,7 @@ class _Fleet:
                 self._crowded_out.append(name)
                 continue
             entry = self._departing.entry(name, self._world)
-            task = Task(msgspec.structs.replace(self._scenario, ego=name), stop=self._stop)
+            task = Task(msgspec.structs.replace(self._scenario, ego=name))
             try:
                 drive = self._departing.drive(entry, task, self._world, is_whole=False)
             except (ScenarioError, StackError) as error:

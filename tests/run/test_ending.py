@@ -20,6 +20,11 @@ STOPPED = (
 SLOW_EGO = '<trip id="ego" from="bc" to="bc" depart="0" departPos="20" departSpeed="0" departLane="0"/>'
 
 
+def to(position: float) -> str:
+    """The slow ego on a trip that ends there [m]."""
+    return SLOW_EGO.replace("/>", f' arrivalPos="{position:g}"/>')
+
+
 def test_a_drive_ends_when_the_ego_stands_at_its_destination(tmp_path: Path, street: Path) -> None:
     record = driven(scenario_file(tmp_path, street))
     assert record.ending is Ending.ARRIVED
@@ -59,12 +64,23 @@ def test_what_follows_a_contact_is_recorded_but_not_judged(tmp_path: Path, stree
 
 
 def test_what_is_concluded_at_the_end_does_not_count_after_a_contact(tmp_path: Path, street: Path) -> None:
-    config = scenario_file(tmp_path, street, SLOW_EGO + STOPPED, end="8")
+    config = scenario_file(tmp_path, street, to(110.0) + STOPPED, end="8")
     record = driven(config, stack="small_stacks:full_throttle", stop=StopRule(after_contact=60.0))
     assert record.ending is Ending.TIME_OVER
     assert record.moments[-1].time == pytest.approx(8.0)
     assert {one.kind for one in record.violations} == {"ttc", "collision"}
     assert {one.kind: one.answer for one in record.judgements}["destination"] is Answer.UNKNOWN
+
+
+@pytest.mark.parametrize(("end", "ending"), [("8", Ending.TIME_OVER), ("5", Ending.CUT)])
+def test_at_the_scenarios_end_who_could_be_there_is_late_and_of_others_it_is_not_known(
+    tmp_path: Path, street: Path, end: str, ending: Ending
+) -> None:
+    record = driven(scenario_file(tmp_path, street, to(110.0), end=end), stack="small_stacks:standing")
+    assert record.ending is ending
+    assert record.moments[-1].time == pytest.approx(float(end))
+    (answer,) = [one.answer for one in record.judgements if one.kind == "destination"]
+    assert answer is (Answer.VIOLATED if ending is Ending.TIME_OVER else Answer.UNKNOWN)
 
 
 def test_without_anything_in_the_way_the_same_drive_is_too_fast(tmp_path: Path, street: Path) -> None:
@@ -99,7 +115,7 @@ def test_an_ego_that_never_starts_is_stuck(tmp_path: Path, street: Path) -> None
 
 
 def test_violations_are_in_the_order_of_time_and_agree_with_the_judgements(tmp_path: Path, street: Path) -> None:
-    config = scenario_file(tmp_path, street, SLOW_EGO, end="12")
+    config = scenario_file(tmp_path, street, to(150.0), end="12")
     record = driven(config, stack="small_stacks:full_throttle")
     assert [one.time for one in record.violations] == sorted(one.time for one in record.violations)
     judged = [one for judgement in record.judgements for one in judgement.violations]
