@@ -21,11 +21,12 @@ _F_GETPATH = 50  # sys/fcntl.h of macOS
 def make_own(log: Path) -> None:
     """Give this process offsets of its own.
 
-    Regular files open for reading are opened anew at the same offset, those open for writing are
+    Regular files open for reading are opened anew at the same offset, for reading alone: a file that is
+    open for both cannot be written any more, which whoever tries is told. Those open for writing alone are
     pointed to the null device, and standard output and error to `log`.
 
     Raises:
-        OSError: A file cannot be opened again.
+        OSError: A file open for reading alone cannot be opened again.
     """
     said = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     null = os.open(os.devnull, os.O_WRONLY)
@@ -48,11 +49,18 @@ def open_descriptors() -> dict[int, int]:
 
 
 def _own(number: int, null: int) -> None:
-    if fcntl.fcntl(number, fcntl.F_GETFL) & os.O_ACCMODE != os.O_RDONLY:
+    access = fcntl.fcntl(number, fcntl.F_GETFL) & os.O_ACCMODE
+    if access == os.O_WRONLY:
         os.dup2(null, number)
         return
     offset = os.lseek(number, 0, os.SEEK_CUR)
-    again = os.open(_path_of(number), os.O_RDONLY)
+    try:
+        again = os.open(_path_of(number), os.O_RDONLY)
+    except OSError:
+        if access == os.O_RDONLY:
+            raise
+        os.dup2(null, number)  # nobody may need it; who reads it is told
+        return
     os.lseek(again, offset, os.SEEK_SET)
     os.dup2(again, number)
     os.close(again)

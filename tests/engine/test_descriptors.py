@@ -1,6 +1,8 @@
 """Files that are open when a process is forked: nobody reads another's bytes away, nobody writes but the first."""
 
+import contextlib
 import os
+import sqlite3
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -45,23 +47,25 @@ def owned(log: Path, job: Callable[[], Any]) -> Any:
     return in_child(work)
 
 
-def test_a_child_reads_on_where_its_parent_was_and_leaves_that_where_it_is(text: Path, log: Path) -> None:
-    with text.open("rb", buffering=0) as file:
+@pytest.mark.parametrize("mode", ["rb", "r+b"])
+def test_a_child_reads_on_where_its_parent_was_and_leaves_that_where_it_is(text: Path, log: Path, mode: str) -> None:
+    with text.open(mode, buffering=0) as file:
         file.read(3)
         assert owned(log, lambda: file.read(4)) == b"3456"
         assert file.read(2) == b"34"
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="only Linux opens a file that has no name")
-def test_a_file_that_was_deleted_is_read_on(text: Path, log: Path) -> None:
-    with text.open("rb", buffering=0) as file:
+@pytest.mark.parametrize("mode", ["rb", "r+b"])
+def test_a_file_that_was_deleted_is_read_on(text: Path, log: Path, mode: str) -> None:
+    with text.open(mode, buffering=0) as file:
         text.unlink()
         file.read(3)
         assert owned(log, lambda: file.read(4)) == b"3456"
         assert file.read(2) == b"34"
 
 
-@pytest.mark.parametrize("mode", ["wb", "ab", "r+b"])
+@pytest.mark.parametrize("mode", ["wb", "ab"])
 def test_what_a_child_writes_into_a_file_of_its_parent_goes_nowhere(text: Path, log: Path, mode: str) -> None:
     with text.open(mode, buffering=0) as file:
         file.write(b"abc")
@@ -70,6 +74,31 @@ def test_what_a_child_writes_into_a_file_of_its_parent_goes_nowhere(text: Path, 
         assert text.read_bytes() == before
         file.write(b"def")
     assert text.read_bytes() != before
+
+
+def test_a_child_is_told_that_it_cannot_write_into_a_file_that_its_parent_reads_and_writes(
+    text: Path, log: Path
+) -> None:
+    with text.open("r+b", buffering=0) as file:
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            owned(log, lambda: file.write(b"from the child"))
+        assert text.read_bytes() == b"0123456789"
+        file.write(b"abc")
+    assert text.read_bytes() == b"abc3456789"
+
+
+@pytest.mark.parametrize("journal", ["delete", "wal"])
+def test_a_child_asks_on_of_a_data_base_that_its_parent_has_open(tmp_path: Path, log: Path, journal: str) -> None:
+    with contextlib.closing(sqlite3.connect(tmp_path / "map.db")) as lanes:
+        lanes.execute(f"pragma journal_mode={journal}")
+        lanes.execute("create table lane (number integer primary key, width real)")
+        lanes.executemany("insert into lane values (?, ?)", ((number, 3.2) for number in range(20_000)))
+        lanes.commit()
+        widest = "select count(*), max(width) from lane"
+        assert owned(log, lambda: lanes.execute(widest).fetchone()) == (20_000, 3.2)
+        lanes.execute("update lane set width = 3.5 where number = 7")
+        lanes.commit()
+        assert lanes.execute(widest).fetchone() == (20_000, 3.5)
 
 
 def test_what_a_child_prints_goes_to_its_log(log: Path) -> None:
@@ -99,6 +128,17 @@ def test_a_file_that_cannot_be_opened_again_is_not_shared_in_silence(
     monkeypatch.setattr(descriptors, "_path_of", lambda number: f"/nowhere/{number}")
     with text.open("rb"), pytest.raises(FileNotFoundError):
         owned(log, int)
+
+
+def test_a_file_for_reading_and_writing_that_cannot_be_opened_again_stands_in_nobodys_way(
+    text: Path, log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(descriptors, "_path_of", lambda number: f"/nowhere/{number}")
+    with text.open("r+b", buffering=0) as file:
+        owned(log, int)
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            owned(log, lambda: file.read(4))
+        assert file.read(2) == b"01"
 
 
 def piecemeal(folder: Path, net: Path) -> Task:
