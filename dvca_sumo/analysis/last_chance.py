@@ -68,7 +68,7 @@ def decisive(
     while True:
         messages = violation_inducing_message(dtest, record, component, time, until, is_exact=is_exact)
         latency = LATENCY if is_exact else LATENCY_OF_STATES
-        rival = next(_later(dtest, record, answer, seen, (messages.last_safe.time, latency), time), None)
+        rival = next(_later(dtest, record, answer, seen, (messages.latest, latency), time), None)
         if rival is None:
             return component, messages
         seen.append(rival)

@@ -18,6 +18,7 @@ class MessageAnswer(msgspec.Struct, frozen=True):
     is_monotone: bool  # as far as was asked
     note: str
     proof: tuple[Question, ...]  # what was asked at the two ends; the run as driven is no question
+    latest: float  # [s] of the last message that no question can tell from `last_safe`: itself where runs repeat
 
 
 def violation_inducing_message(
@@ -27,8 +28,9 @@ def violation_inducing_message(
 
     Starts from what is known of the component: SAFE when ideal from some message on, and VIOLATES from a
     later one on or, as the factual run shows, when not ideal at all. In exact mode the search ends on
-    adjacent messages; else on adjacent states, of which the last message of the safe one is meant.
-    A substitution from a state on begins where that state is first met: there alone it can be asked for.
+    adjacent messages; else on adjacent states.
+    A substitution from a state on begins where that state is first met: there alone it can be asked for, and
+    the message made there is the last that is proven. An ego at rest stays in its state as long as it waits.
     Monotonicity is assumed inside the bracket, and checked against all that was asked, one state to
     either side of where the search ends included.
 
@@ -62,21 +64,22 @@ def violation_inducing_message(
         bracket = bisect(test, bracket, share=share)
     dtest.ask_all([question(one) for one in _around(states, dtest.known(component), bracket)])
     is_monotone = _is_monotone(known(), bracket)
-    low = bracket.low
+    latest = bracket.low
     if not is_exact:
         state = marks[bracket.low].state
-        low = max(index for index in range(bracket.low, bracket.high) if marks[index].state == state)
+        latest = max(index for index in range(bracket.low, bracket.high) if marks[index].state == state)
     is_adjacent = bracket.high == bracket.low + 1 if is_exact else _are_neighbours(states, bracket, len(marks))
     note = "" if is_adjacent else "messages in between could not be told"
     if not is_monotone:
         note = "the outcome is not monotone in the first substituted message" + (f"; {note}" if note else "")
     return MessageAnswer(
-        last_safe=marks[low],
+        last_safe=marks[bracket.low],
         first_violating=marks[bracket.high] if bracket.high < len(marks) else None,
         is_adjacent=is_adjacent,
         is_monotone=is_monotone,
         note=note,
         proof=tuple(question(end) for end in (bracket.low, bracket.high) if end < len(marks)),
+        latest=marks[latest].time,
     )
 
 

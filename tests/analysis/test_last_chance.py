@@ -152,6 +152,17 @@ def test_of_control_it_is_asked_however_late_its_chance_was(*, is_enough_further
     assert is_by_luck(dtest, DRIVE, component, messages, TIME) is not is_enough_further_back
 
 
+def test_with_jitter_none_is_later_than_another_within_one_state_of_an_ego_at_rest() -> None:
+    record = drive(duration=20.0, violations=(collision(TIME),))
+    record.stations = [min(station, 100.0) for station in record.stations]
+    enough = {one: record.first_at(one, TIME - 2.0) for one in (LOCALIZATION, PERCEPTION)}
+    dtest = asking(FakeEngine(answering(record, enough)), jitters=(0, 1, 2))
+    answer = responsible_component(dtest, record, TIME)
+    component, messages = decisive(dtest, record, answer, TIME, TIME + 4.0, is_exact=False)
+    assert component is LOCALIZATION
+    assert messages.last_safe.time == pytest.approx(START + 8.0)
+
+
 @pytest.mark.parametrize("is_exact", [True, False])
 @pytest.mark.parametrize("before", [0.0, 0.1, 0.4, 1.0])
 def test_of_a_drive_that_ends_with_its_violation_nothing_later_is_asked(before: float, *, is_exact: bool) -> None:

@@ -141,18 +141,28 @@ def test_an_outcome_that_is_not_monotone_where_it_was_asked_is_noticed_and_the_e
 
 
 @pytest.mark.parametrize("last", range(BEFORE_CRASH - 1))
-def test_with_jitter_the_search_ends_on_adjacent_states_and_names_the_last_message_of_the_safe_one(last: int) -> None:
+def test_with_jitter_the_search_ends_on_adjacent_states_and_names_the_first_message_of_the_safe_one(last: int) -> None:
     answer, dtest = found(DRIVE, PERCEPTION, needing(DRIVE, PERCEPTION, last, CRASH), is_exact=False)
     states = [DRIVE.stations[10 * index] // 2.0 for index in range(BEFORE_CRASH)]
     starts = [index for index in range(BEFORE_CRASH) if index == 0 or states[index] != states[index - 1]]
     low = max(start for start in starts if start <= last)
     high = min((start for start in starts if start > last), default=BEFORE_CRASH)
-    assert answer.last_safe.index == high - 1
+    assert answer.last_safe.index == low
+    assert answer.latest == DRIVE.mark(MessageId(PERCEPTION, high - 1)).time
     assert (BEFORE_CRASH if answer.first_violating is None else answer.first_violating.index) == high
     assert answer.is_adjacent
     assert dtest.evidence(answer.proof[0]) is not None
-    assert answer.last_safe.state == DRIVE.mark(MessageId(PERCEPTION, low)).state
+    assert answer.proof[0] == Question((PERCEPTION,), answer.last_safe if low > 0 else None)
     assert ends(dtest, answer)[0] is Outcome.SAFE
+
+
+def test_with_jitter_a_wait_is_named_where_it_begins_as_only_that_is_proven() -> None:
+    waiting = replace(DRIVE, stations=[min(station, 40.0) for station in DRIVE.stations])
+    answer, dtest = found(waiting, PERCEPTION, needing(waiting, PERCEPTION, 33, CRASH), is_exact=False)
+    assert answer.last_safe.time == pytest.approx(START + 2.0)
+    assert answer.latest == pytest.approx(START + 4.9)
+    assert answer.first_violating is None
+    assert [probe.outcome for probe in dtest.probes if probe.question == answer.proof[0]] == 3 * [Outcome.SAFE]
 
 
 def test_with_jitter_each_question_is_repeated() -> None:
