@@ -2,7 +2,8 @@
 
 Three things differ from an ego's drive. The destination is not asked of them: SUMO takes its vehicles away at speed,
 where they arrive. They go on after a contact, which to SUMO may be none; but as an ego's drive, theirs is not judged
-any more. And they have more patience, so that their travel times are known.
+any more. And they have more patience, so that their travel times are known. Whom SUMO sends another way is followed no
+farther.
 """
 
 from collections.abc import Sequence
@@ -11,7 +12,7 @@ from functools import partial
 from dvca_sumo.engine.replay import roadmap
 from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.roadmap import RouteError
-from dvca_sumo.run import Departing, opened
+from dvca_sumo.run import Departing, free_flow, opened, patience
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.screen.driving import Driven, Heard
 from dvca_sumo.screen.neighbours import Neighbourhood
@@ -23,13 +24,14 @@ from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Ending
 from dvca_sumo.world import Entry, Native, World
 
-_PATIENCE = 1200.0  # [s] for one trip: some scenarios jam for ever
+_PATIENCE = 1200.0  # [s] for one trip, at least: some scenarios jam for ever
 
 
 def anchored(scenario: Scenario, trips: Sequence[Trip], hear: Heard) -> Driven:
     """Watch SUMO's drivers on `trips`, in this process.
 
-    A trip on which SUMO teleports the vehicle or gives it another route is `ABORTED`: it is watched until then.
+    A trip on which SUMO teleports the vehicle is `ABORTED`, one on which it gives it another route `CUT`: it is watched
+    until then.
 
     Raises:
         ScenarioError: SUMO refuses the scenario, or gave up.
@@ -43,7 +45,7 @@ def anchored(scenario: Scenario, trips: Sequence[Trip], hear: Heard) -> Driven:
         while (awaited or rides) and not world.is_exhausted and not _is_late(world, scenario):
             world.advance()
             neighbourhood.see(world)
-            arrived = world.arrived()
+            arrived = set(world.arrived()) - set(world.teleported())  # to the end of its trip, SUMO may do both
             for name in world.departed():
                 if name in awaited:
                     awaited.remove(name)
@@ -76,7 +78,7 @@ class _Ride:
         self.native: Native = world.watch(entry, route)
         self._oracles = [oracle for oracle in judging.oracles if oracle.kind != Destination.kind]
         self._watch = Watch(entry.ego, judging, Queues(world.is_stopping))
-        self._latest = entry.time + _PATIENCE
+        self._latest = entry.time + max(_PATIENCE, patience(free_flow(route)))
         self._is_judged = True
 
     def step(self, world: World, *, is_gone: bool) -> TripResult | None:
@@ -84,7 +86,9 @@ class _Ride:
         if is_gone:
             return self._result(TripOutcome.ARRIVED)
         if not world.follow(self.native):
-            return self._result(TripOutcome.ABORTED, f"SUMO teleported it or changed its route at {world.time:g} s")
+            return self._result(TripOutcome.ABORTED, f"SUMO teleported it or took it away at {world.time:g} s")
+        if self.native.is_rerouted:
+            return self._result(TripOutcome.CUT, f"SUMO gave it another route at {world.time:g} s")
         moment = world.observe(self.native)
         self._watch.see(moment)
         if self._is_judged and self._has_touched(moment):

@@ -20,7 +20,7 @@ class TripOutcome(enum.StrEnum):
     ARRIVED = "arrived"
     TIME_OVER = "time_over"  # of its patience, or no progress
     CONTACT = "contact"
-    CUT = "cut"  # the scenario ended before its patience did: what would have come of it is not known
+    CUT = "cut"  # the scenario ended first, or SUMO gave it another route: what would have come of it is not known
     ABORTED = "aborted"  # the stack failed, or SUMO took the vehicle away
     NOT_DRIVEN = "not_driven"
 
@@ -43,7 +43,7 @@ class TripResult(msgspec.Struct, frozen=True):
 
 
 def cut_off(end: float) -> str:
-    """Why a trip is CUT."""
+    """Why a trip is CUT that the scenario's end cuts off."""
     return f"the scenario ended at {end:g} s"
 
 

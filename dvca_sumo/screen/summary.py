@@ -54,7 +54,7 @@ class DriverSummary(msgspec.Struct, frozen=True):
     trips: int  # that were driven
     not_driven: int
     ended_by_simulator: int  # by a contact of its doing: counted apart
-    cut: int  # by the scenario's end, before their patience was over: likewise
+    cut: int  # by the scenario's end before their patience was over, or by SUMO with another route: likewise
     completed: Share  # of the others
     km: float
     hours: float

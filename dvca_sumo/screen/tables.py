@@ -183,7 +183,7 @@ def _range(values: Quartiles) -> str:
 _ROWS: Sequence[tuple[str, Callable[[DriverSummary], str]]] = (
     ("trips driven", lambda one: str(one.trips)),
     ("ended by the simulator", lambda one: str(one.ended_by_simulator)),
-    ("cut by the scenario's end", lambda one: str(one.cut)),
+    ("cut by the scenario's end or another route", lambda one: str(one.cut)),
     ("completed, of the others", lambda one: _share(one.completed)),
     ("km", lambda one: f"{one.km:.1f}"),
     ("at-fault collisions", lambda one: str(one.at_fault_collisions)),

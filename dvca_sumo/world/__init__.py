@@ -121,11 +121,11 @@ class World:
         return Native(entry, route)
 
     def follow(self, native: Native) -> bool:
-        """Bring a native up to this world step; False: SUMO teleports it, or it is gone, or on another route."""
+        """Bring a native up to this world step; False: SUMO teleports it, or it is gone."""
         if not self._session.has(native.name):
             return False
         motion = self._session.motion(native.name)
-        if not motion.is_on_road or motion.edges[-len(native.edges) :] != native.edges:
+        if not motion.is_on_road:
             return False
         native.follow(self.time, motion)
         return True

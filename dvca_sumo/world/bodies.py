@@ -103,7 +103,8 @@ class Native:
         self.route = route
         self.shape = shape_of(entry)
         self.signals = _signals(route)
-        self.edges = entry.edges
+        self.is_rerouted = False  # by SUMO, since its departure
+        self._edges = entry.edges
         self._way = _Way(route, self.shape)
         self.truth = self._seen(
             entry.time,
@@ -117,7 +118,8 @@ class Native:
         return self._way.station(self.truth)
 
     def follow(self, time: float, motion: Motion) -> None:
-        """Take over how it moves at `time` [s]."""
+        """Take over how it moves at `time` [s], and on what route."""
+        self.is_rerouted |= motion.edges[-len(self._edges) :] != self._edges
         if time > self.truth.time:
             self.truth = self._seen(time, motion, self.truth.heading, time - self.truth.time)
 

@@ -4,16 +4,20 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import msgspec
 import pytest
 from screen_scenes import HEAR, TRAFFIC, draw, drive, traffic
 from small_scenarios import driven as driven_alone
-from small_scenarios import in_child
+from small_scenarios import in_child, scenario_file
 
-from dvca_sumo.scenario import Scenario
+from dvca_sumo.scenario import AUTO, Scenario, load_scenario
+from dvca_sumo.screen import anchor
 from dvca_sumo.screen.anchor import anchored
 from dvca_sumo.screen.driving import driven
 from dvca_sumo.screen.judging import Fault
+from dvca_sumo.screen.neighbours import Neighbours
 from dvca_sumo.screen.results import TripOutcome
+from dvca_sumo.screen.summary import summary_of
 from dvca_sumo.screen.trips import Trip
 from dvca_sumo.stack.sources import StackSource
 
@@ -96,6 +100,42 @@ def test_sumos_drivers_are_judged_by_the_same_oracles(tmp_path: Path, street: Pa
     assert {(one.violation.kind, one.fault) for one in results["second"].violations} == {("speed_limit", Fault.DRIVER)}
     assert [result.ego for result in results.values() if result.violations] == ["second"]
     assert results["first"].distance > 450.0
+
+
+def test_what_comes_of_a_trip_is_not_known_where_sumo_gives_its_driver_another_route(
+    tmp_path: Path, grid_file: Callable[..., Path]
+) -> None:
+    closed = (
+        '<rerouter id="r" edges="A1B1"><interval begin="0" end="99"><closingReroute id="B1C1"/></interval></rerouter>'
+    )
+    routes = '<vehicle id="v" depart="1" departPos="100"><route edges="A0A1 A1B1 B1C1 C1C2"/></vehicle>'
+    scenario = load_scenario(scenario_file(tmp_path, grid_file(), routes, closed), AUTO)
+    (sumo,) = in_child(partial(anchored, scenario, [Trip("v", 1.0, 300.0, 22.0, 60.0)], HEAR)).results
+    assert sumo.outcome is TripOutcome.CUT
+    assert sumo.reason.startswith("SUMO gave it another route at ")
+    found = summary_of([msgspec.structs.replace(sumo, outcome=TripOutcome.ARRIVED)], [sumo], Neighbours(0.0, 0, 0, 0))
+    assert found.travel_time_ratio.count == 0
+
+
+def test_a_trip_on_which_sumo_teleports_its_driver_is_not_completed(tmp_path: Path, lane: Path) -> None:
+    routes = (
+        '<vehicle id="parked" depart="0" departPos="195"><route edges="we"/><stop lane="we_0" endPos="200" '
+        'duration="1000"/></vehicle><trip id="v" from="we" to="we" depart="1" departPos="170"/>'
+    )
+    scenario = traffic(tmp_path, lane, routes, time_to_teleport="5")
+    (sumo,) = in_child(partial(anchored, scenario, [Trip("v", 1.0, 300.0, 22.0, 60.0)], HEAR)).results
+    assert sumo.outcome is TripOutcome.ABORTED
+    assert sumo.reason.startswith("SUMO teleported it or took it away at ")
+
+
+def test_sumos_drivers_have_an_egos_patience_at_least(
+    tmp_path: Path, lane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(anchor, "_PATIENCE", 10.0)
+    scenario, trips = behind_a_slow_one(tmp_path, lane, "4", "600")
+    (sumo,) = in_child(partial(anchored, scenario, trips, HEAR)).results
+    assert sumo.outcome is TripOutcome.ARRIVED
+    assert sumo.duration > 60.0
 
 
 def test_sumos_drivers_make_no_stops_that_the_ads_does_not_make(tmp_path: Path, street: Path) -> None:
