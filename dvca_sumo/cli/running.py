@@ -49,7 +49,7 @@ class _Terminal(Progress):
 @click.argument("sumocfg", type=click.Path(path_type=Path))
 @click.option("--fault", "faults", multiple=True, metavar="NAME[:key=value,...]", help="Plant a fault; see `faults`.")
 @click.option("--bug", metavar="NAME", help="A real bug for the reference stack to have; see `faults`.")
-@click.option("--ego", metavar="ID|auto", help="The ego's vehicle id, or auto to pick one.")
+@click.option("--ego", metavar="ID|auto", help="The ego's vehicle id, or auto; see above.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 1), help="For SUMO's drivers and the ADS's sensors.")
 @click.option("--stack", metavar="MODULE:FACTORY|FILE.toml", help="Your own stack, or parameters of the reference one.")
 @click.option("--engine", type=click.Choice(list(api.ENGINES)), default=api.DEFAULT_ENGINE, show_default=True)
@@ -81,7 +81,9 @@ def run(
     """Run a scenario; if a violation occurs, find the component and the message that caused it.
 
     SUMOCFG is any SUMO configuration. The ego is --ego, or the vehicle with the parameter
-    dvca.ego=true, or the vehicle with the id "ego". Nothing is written beside the configuration.
+    dvca.ego=true, or the vehicle with the id "ego"; with --ego auto it is the first car that
+    departs 60 s after the begin or later, to meet traffic, on a drivable trip of 500 m or more.
+    Nothing is written beside the configuration.
 
     \b
     Exit codes: 0 no violation; 1 violation, attributed; 2 usage; 3 bad input;

@@ -66,7 +66,7 @@ class World:
                 if name == wanted:
                     return self._session.entry(name, settings)
                 if wanted == AUTO and self.time < earliest:
-                    unfit[f"before {earliest:g} s"] += 1
+                    unfit[f"before {earliest:g} s (auto chooses from {AUTO_DELAY:g} s after the begin on)"] += 1
                 elif wanted == AUTO:
                     entry = self._session.entry(name, settings)
                     objection = entry.why_no_car

@@ -94,6 +94,7 @@ def test_no_words_at_all_show_the_help(called: Called) -> None:
             (
                 *("SUMOCFG", "--fault", "--bug", "--ego", "--seed", "--stack", "--engine", "--jobs", "--jitter"),
                 *("--repeats", "--begin", "--end", "-o", "--json"),
+                *("--ego auto it is the first car that departs 60 s after the begin", "500 m"),
                 *("0 no violation", "1 violation", "2 usage", "3 bad input", "4 violation", "70", "130"),
             ),
         ),

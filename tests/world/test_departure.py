@@ -31,12 +31,15 @@ def test_auto_takes_the_first_car_that_meets_traffic(tmp_path: Path, street: Pat
 
 
 def test_auto_says_when_no_trip_is_fit(tmp_path: Path, street: Path) -> None:
-    scenario = load_scenario(scenario_file(tmp_path, street, FLOW), "auto", end=65.0)
+    scenario = load_scenario(scenario_file(tmp_path, street, FLOW), "auto", begin=5.0, end=70.0)
 
     def job() -> None:
         World(scenario, tmp_path).await_ego((), lambda _: False)
 
-    says = r"no vehicle fit to be the ego departs between 0 s and 65 s; departed: \d+ before 60 s, \d+ without a trip"
+    says = (
+        r"no vehicle fit to be the ego departs between 5 s and 70 s; departed: "
+        r"\d+ before 65 s \(auto chooses from 60 s after the begin on\), \d+ without a trip"
+    )
     with pytest.raises(ScenarioError, match=says):
         in_child(job)
 
