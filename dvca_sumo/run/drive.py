@@ -206,7 +206,7 @@ class Drive:
         made = self._executions[component]
         try:
             message = self._steps[component](moment)
-        except Exception as error:
+        except (Exception, SystemExit) as error:  # a component has no business with the process, to end it neither
             cycle = self._tick // TICKS_PER_STEP
             said = f"{type(error).__name__}: {error}"
             raise StackError(f"{component} raised {said} in cycle {cycle} ({self._path[-1].time:.2f} s)") from error

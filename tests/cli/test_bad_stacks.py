@@ -20,6 +20,7 @@ BAD_FACTORIES = {
     "users_stacks:raising": ("'users_stacks:raising' raised LookupError", "no weights for seed 5"),
     "users_stacks:of_another_type": ("'users_stacks:of_another_type' returned dict, not a Stack",),
     "users_stacks:fails_in_cycle_57": ("planning raised ArithmeticError: no convergence in cycle 57",),
+    "users_stacks:leaves": ("control raised SystemExit: 3 in cycle 0",),
     "users_stacks:not_a_number": ("control", "must be finite", "nan"),
 }
 BAD_FILES = {

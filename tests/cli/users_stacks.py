@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -32,6 +33,17 @@ class Steering:
 
     def step(self, localization: LocalizationEstimate, trajectory: Trajectory | None) -> ControlCommand:  # noqa: ARG002
         return ControlCommand(localization.time, 3.0, self._angle())
+
+
+class Leaves:
+    """It gives up like a script."""
+
+    def step(self, localization: LocalizationEstimate, trajectory: Trajectory | None) -> ControlCommand:  # noqa: ARG002
+        sys.exit(3)
+
+
+def leaves(context: StackContext) -> Stack:
+    return replace(reference_stack(context), control=Leaves())
 
 
 def fails_in_cycle_57(context: StackContext) -> Stack:
