@@ -1,5 +1,6 @@
 """Where a stack comes from: the words of the command line -> a factory."""
 
+import contextlib
 import importlib
 import sys
 import tomllib
@@ -46,8 +47,9 @@ def stack_factory(source: StackSource) -> StackFactory:
     if "" not in sys.path:
         sys.path.insert(0, "")  # a user's module lies where the command is typed
     try:
-        factory = getattr(importlib.import_module(module_name), name)
-    except Exception as error:  # noqa: BLE001 - a user's module may raise anything while it is imported
+        with contextlib.redirect_stdout(sys.stderr):  # standard output is the result's alone
+            factory = getattr(importlib.import_module(module_name), name)
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's module may raise anything while it is imported
         raise StackError(f"stack factory {stack!r} cannot be imported: {_said(error)}") from None
     if not callable(factory):
         raise StackError(f"stack factory {stack!r} is not callable: {factory!r}")
@@ -80,7 +82,7 @@ def built_checked(source: str, factory: StackFactory) -> StackFactory:
     def build(context: StackContext) -> Stack:
         try:
             stack = factory(context)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise StackError(f"stack factory {source!r} raised {_said(error)}") from error
         if not isinstance(stack, Stack):
             raise StackError(f"stack factory {source!r} returned {type(stack).__name__}, not a Stack")
@@ -98,5 +100,5 @@ def _config(path: Path) -> StackConfig:
         raise StackError(f"stack file {path}: {error}") from None
 
 
-def _said(error: Exception) -> str:
+def _said(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}"

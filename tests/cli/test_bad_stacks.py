@@ -15,9 +15,11 @@ BAD_FACTORIES = {
     "nowhere:stack": ("'nowhere:stack' cannot be imported", "No module named 'nowhere'"),
     "users_stacks:nothing": ("'users_stacks:nothing' cannot be imported", "no attribute 'nothing'"),
     "half_written:stack": ("'half_written:stack' cannot be imported", "SyntaxError"),
+    "a_script:stack": ("'a_script:stack' cannot be imported", "SystemExit: 0"),
     "users_stacks": ("no stack 'users_stacks'", "MODULE:FACTORY", "FILE.toml"),
     "users_stacks:NOT_CALLABLE": ("'users_stacks:NOT_CALLABLE' is not callable",),
     "users_stacks:raising": ("'users_stacks:raising' raised LookupError", "no weights for seed 5"),
+    "users_stacks:exiting": ("'users_stacks:exiting' raised SystemExit: no licence",),
     "users_stacks:of_another_type": ("'users_stacks:of_another_type' returned dict, not a Stack",),
     "users_stacks:fails_in_cycle_57": ("planning raised ArithmeticError: no convergence in cycle 57",),
     "users_stacks:leaves": ("control raised SystemExit: 3 in cycle 0",),
@@ -36,6 +38,7 @@ BAD_FILES = {
 def test_a_factory_that_does_not_work(stack: str, tmp_path: Path) -> None:
     shutil.copy(STACKS, tmp_path)
     (tmp_path / "half_written.py").write_text("def stack(", encoding="utf-8")
+    (tmp_path / "a_script.py").write_text("import sys\nsys.exit(0)\n", encoding="utf-8")
     said = typed("run", "nets/cs1.sumocfg", "--seed", "5", "--stack", stack, folder=tmp_path)
     assert_one_error(said, ExitCode.BAD_INPUT, *BAD_FACTORIES[stack])
 
@@ -61,6 +64,17 @@ def test_a_parameter_file_that_fits_is_used(tmp_path: Path, scenario: Callable[.
     assert plain["verdict"] == slow["verdict"] == "none"
     assert plain["digest"] != slow["digest"]
     assert (plain["stack"], slow["stack"]) == (None, str(tmp_path / "slow.toml"))
+
+
+def test_what_a_module_prints_while_it_is_imported_is_no_part_of_the_result(
+    tmp_path: Path, scenario: Callable[..., Path]
+) -> None:
+    text = "from dvca_sumo.stack.reference import reference_stack as stack\nprint('weights loaded')\n"
+    (tmp_path / "talkative.py").write_text(text, encoding="utf-8")
+    said = typed("run", scenario(), "--json", "--stack", "talkative:stack", folder=tmp_path)
+    assert said.code == ExitCode.NO_VIOLATION, said
+    assert said.result["verdict"] == "none"
+    assert said.err.splitlines()[0] == "weights loaded"
 
 
 def test_a_stack_that_crashes_its_process_is_an_internal_error_not_a_dead_tool(tmp_path: Path) -> None:

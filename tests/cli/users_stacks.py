@@ -55,6 +55,10 @@ def raising(context: StackContext) -> Stack:
     raise LookupError(f"no weights for seed {context.seed}")
 
 
+def exiting(context: StackContext) -> Stack:  # noqa: ARG001
+    sys.exit("no licence")
+
+
 def of_another_type(context: StackContext) -> Any:
     return {"planning": reference_stack(context).planning}
 
