@@ -92,6 +92,13 @@ def attribute(drive: FactualDrive, progress: Progress | None = None, *, certify:
     """
     try:
         witness = drive.engine.witness if certify else None
-        return explain(drive.engine, drive.request, drive.record, progress or Progress(), witness)
+        return explain(drive.engine, drive.request, drive.record, progress or Progress(), witness, _afresh(drive))
     finally:
         drive.engine.close()
+
+
+def _afresh(drive: FactualDrive) -> Engine | None:
+    """Who repeats the run of a stack of the user's own, where the engine's own repetition begins with a copy of it."""
+    if drive.source.is_reference or drive.engine.fallback is not None or drive.engine.witness is drive.engine:
+        return None
+    return drive.engine.witness

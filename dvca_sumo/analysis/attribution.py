@@ -125,12 +125,19 @@ def setting_of(request: Request, record: Record, violation: Violation) -> Settin
 
 
 def explain(
-    engine: Engine, request: Request, record: Record, progress: Progress, witness: Engine | None = None
+    engine: Engine,
+    request: Request,
+    record: Record,
+    progress: Progress,
+    witness: Engine | None = None,
+    afresh: Engine | None = None,
 ) -> Attribution:
     """Explain the violation of a factual run, if there is one.
 
     A run without a violation of which an oracle could not tell is UNRESOLVED, not clean. With a
     `witness` the conclusion is asked of that engine too; where it disagrees, nothing is concluded.
+    With `afresh` the premise takes one more run, by that engine: one whose runs all start at time 0
+    sees what a stack has drawn before the first copy was made of it.
 
     Raises:
         AttributionStoppedError: The user interrupted it.
@@ -146,7 +153,7 @@ def explain(
         setting = setting_of(request, record, principal(record.violations))
         asked.append(Dtest(engine, setting, progress.probe))
         found = replace(found, until=setting.stop.at)
-        for answer in _steps(found, engine, asked[0], request):
+        for answer in _steps(found, engine, asked[0], request, afresh):
             found = answer
         if witness is not None:
             asked.append(Dtest(witness, setting, progress.probe, len(asked[0].probes)))
@@ -187,10 +194,12 @@ def _factual_task(request: Request) -> Task:
     )
 
 
-def _steps(found: Attribution, engine: Engine, dtest: Dtest, request: Request) -> Iterator[Attribution]:
+def _steps(
+    found: Attribution, engine: Engine, dtest: Dtest, request: Request, afresh: Engine | None
+) -> Iterator[Attribution]:
     """The answer after each step of Algorithm 1."""
     assert found.violation is not None  # or there would be nothing to explain
-    doubt = _premise(engine, dtest, _factual_task(request), found)
+    doubt = _premise(engine, dtest, _factual_task(request), found, afresh)
     if doubt:
         yield replace(found, verdict=Verdict.NOT_REPRODUCIBLE, is_reproducible=False, reason=doubt)
         return
@@ -203,7 +212,7 @@ def _steps(found: Attribution, engine: Engine, dtest: Dtest, request: Request) -
         yield _decided(found, dtest, engine, is_exact=request.repeats is None)
 
 
-def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution) -> str:
+def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution, afresh: Engine | None) -> str:
     """Why the violation does not reproduce; empty when it does."""
     outcome = dtest.ask(Question(()))
     if outcome is not Outcome.VIOLATES and factual.jitter is not None:
@@ -215,14 +224,22 @@ def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution) ->
     is_same = probe.steps > 0 and digests[probe.steps - 1 : probe.steps] == [probe.last_step]
     if is_same and outcome is Outcome.SAFE:
         return f"the repeated run is the same, but shows no violation until {found.until:.1f} s"
-    if is_same or factual.jitter is not None:
+    if factual.jitter is not None or (is_same and afresh is None):
         return ""
+    return _differing(afresh or engine, factual, found.record, is_known=not is_same)
+
+
+def _differing(engine: Engine, factual: Task, record: Record, *, is_known: bool) -> str:
+    """Where one more run of the factual task differs; empty where it does not, unless another is known to."""
     try:
         again = engine.record(factual).digests
     except (ScenarioError, StackError, RunFailedError) as error:
-        return f"the repeated run differs, and one more run failed: {error}"
-    same = next((step for step, pair in enumerate(zip(digests, again, strict=False)) if len({*pair}) > 1), len(again))
-    return f"the repeated run differs: first at {found.record.start + 0.1 * same:.1f} s"
+        return f"{'the repeated run differs, and ' if is_known else ''}one more run failed: {error}"
+    if not is_known and again == record.digests:
+        return ""
+    pairs = enumerate(zip(record.digests, again, strict=False))
+    same = next((step for step, pair in pairs if len({*pair}) > 1), len(again))
+    return f"the repeated run differs: first at {record.start + 0.1 * same:.1f} s"
 
 
 def _planning_message(found: Attribution, engine: Engine) -> Attribution:

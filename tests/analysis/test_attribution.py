@@ -225,6 +225,19 @@ def test_a_repeated_run_that_ends_earlier_differs_from_there_on() -> None:
     assert f"{START + 2.0:.1f} s" in found.reason
 
 
+def test_a_run_from_time_0_that_differs_does_not_reproduce_what_a_copy_repeats() -> None:
+    record = faulty_drive()
+    answers = answering(record, {PERCEPTION: FATAL})
+    assert attributed(record, answers, afresh=record).verdict is Verdict.COMPONENT
+    other = replace(record, digests=[*record.digests[:7], b"other", *record.digests[8:]])
+    found = attributed(record, answers, afresh=other)
+    assert found.verdict is Verdict.NOT_REPRODUCIBLE
+    assert f"first at {START + 0.7:.1f} s" in found.reason
+    failed = attributed(record, answers, afresh=StackError("planning raised ValueError"))
+    assert failed.verdict is Verdict.NOT_REPRODUCIBLE
+    assert "one more run failed: planning raised ValueError" in failed.reason
+
+
 def test_the_same_run_without_the_violation_does_not_reproduce_it() -> None:
     found = attributed(faulty_drive(), lambda _: glimpse(steps=44))
     assert found.verdict is Verdict.NOT_REPRODUCIBLE

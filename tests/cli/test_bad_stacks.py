@@ -83,9 +83,12 @@ def test_a_stack_that_crashes_its_process_is_an_internal_error_not_a_dead_tool(t
     assert_one_error(said, ExitCode.INTERNAL, "the run failed: the process died")
 
 
-def test_a_stack_that_never_drives_alike_is_not_reproducible(tmp_path: Path, scenario: Callable[..., Path]) -> None:
+@pytest.mark.parametrize("stack", ["never_the_same", "drawn_at_the_start"])
+def test_a_stack_that_never_drives_alike_is_not_reproducible(
+    stack: str, tmp_path: Path, scenario: Callable[..., Path]
+) -> None:
     shutil.copy(STACKS, tmp_path)
-    words = ("--stack", "users_stacks:never_the_same", "--json")
+    words = ("--stack", f"users_stacks:{stack}", "--json")
     said = typed("run", scenario(), *words, folder=tmp_path)
     assert said.code == ExitCode.UNRESOLVED, said
     assert said.result["verdict"] == "not_reproducible"

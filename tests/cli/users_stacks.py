@@ -71,6 +71,11 @@ def never_the_same(context: StackContext) -> Stack:
     return replace(reference_stack(context), control=Steering(lambda: os.urandom(1)[0] / 2550.0 - 0.05))
 
 
+def drawn_at_the_start(context: StackContext) -> Stack:
+    drawn = 0.05 + int.from_bytes(os.urandom(6)) * 1e-17
+    return replace(reference_stack(context), control=Steering(lambda: drawn))
+
+
 def crashing(context: StackContext) -> Stack:  # noqa: ARG001
     os.kill(os.getpid(), signal.SIGSEGV)
     raise AssertionError
