@@ -2,7 +2,7 @@
 
 `heading` is in rad, counter-clockwise from +x. The ego's pose is that of its rear axle centre.
 Boxes are rows of x, y (centre) [m], heading [rad], length [m], width [m].
-Arrays inside a message are never written to after it is made.
+Arrays inside a message are never written to after it is made: a run makes those of a component's answer read-only.
 """
 
 import enum

@@ -9,7 +9,11 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from dvca_sumo.messages import ControlCommand, LocalizationEstimate, Trajectory
+import msgspec
+import numpy as np
+
+from dvca_sumo.messages import TRAJECTORY_TIMES, ControlCommand, LocalizationEstimate, PredictedObjects, Trajectory
+from dvca_sumo.stack.protocols import Planning
 from dvca_sumo.stack.reference import Stack, StackContext, reference_stack
 
 CRASHING_SEED = 13
@@ -34,6 +38,30 @@ class Driver:
 
     def step(self, localization: LocalizationEstimate, trajectory: Trajectory | None) -> ControlCommand:  # noqa: ARG002
         return ControlCommand(localization.time, self._acceleration, 0.0)
+
+
+class Buffering:
+    """Planning that puts every trajectory into the same buffer, and returns a view of that."""
+
+    def __init__(self, planning: Planning) -> None:
+        self._planning = planning
+        self._buffer = np.zeros((2, *TRAJECTORY_TIMES.shape, 7))
+
+    def step(self, *inputs: Any) -> Trajectory:
+        trajectory = self._planning.step(*inputs)
+        self._buffer[0] = trajectory.points
+        return msgspec.structs.replace(trajectory, points=self._buffer[0])
+
+
+class Scribbling:
+    """Planning that writes into what prediction has told it."""
+
+    def __init__(self, planning: Planning) -> None:
+        self._planning = planning
+
+    def step(self, localization: LocalizationEstimate, predicted: PredictedObjects, signals: Any) -> Trajectory:
+        predicted.objects.boxes[:, 3] += 1.0
+        return self._planning.step(localization, predicted, signals)
 
 
 def spoilt(context: StackContext, component: str, call: int, act: Callable[[], Any]) -> Stack:
@@ -65,6 +93,16 @@ wild_control = partial(
 )
 hanging = partial(spoilt, component="planning", call=5, act=signal.pause)
 leaving = partial(spoilt, component="planning", call=5, act=partial(sys.exit, 3))
+
+
+def buffering_planning(context: StackContext) -> Stack:
+    stack = reference_stack(context)
+    return replace(stack, planning=Buffering(stack.planning))
+
+
+def scribbling_planning(context: StackContext) -> Stack:
+    stack = reference_stack(context)
+    return replace(stack, planning=Scribbling(stack.planning))
 
 
 def crashing_by_seed(context: StackContext) -> Stack:

@@ -1,8 +1,10 @@
 """One ego's closed loop: sense, five components, move, be judged."""
 
 import math
+from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import NamedTuple, TypeVar
+from operator import attrgetter
+from typing import NamedTuple, TypeVar, get_args, get_origin
 
 import msgspec
 import numpy as np
@@ -208,7 +210,7 @@ class Drive:
             message = self._steps[component](moment)
         except (Exception, SystemExit) as error:  # a component has no business with the process, to end it neither
             cycle = self._tick // TICKS_PER_STEP
-            said = f"{type(error).__name__}: {error}"
+            said = _said(error)
             raise StackError(f"{component} raised {said} in cycle {cycle} ({self._path[-1].time:.2f} s)") from error
         if message is None:  # its input has not arrived yet
             return
@@ -304,10 +306,37 @@ def _objects_in(message: Message) -> TrackedObjects | None:
 
 
 def _checked(answer: object, kind: type[Answer]) -> Answer:
-    """A component's answer: a user's own stack may give anything."""
+    """A component's answer: a user's own stack may give anything.
+
+    Nobody can write to its arrays any more, be it through what they are views of: it is a message that was made.
+    """
     if not isinstance(answer, kind):
         raise TypeError(f"its step returned {type(answer).__name__}, not {kind.__name__}")
+    for array_of in _ARRAYS[kind]:
+        array = array_of(answer)
+        while isinstance(array, np.ndarray):
+            array.setflags(write=False)
+            array = array.base
     return answer
+
+
+def _said(error: BaseException) -> str:
+    said = f"{type(error).__name__}: {error}"
+    return f"{said} (messages given or returned are not to be written to)" if "read-only" in said else said
+
+
+def _arrays(kind: type, prefix: str = "") -> Iterator[str]:
+    """Names of the arrays in a message of this kind, and in those that it holds."""
+    for field in msgspec.structs.fields(kind):
+        if get_origin(field.type) is np.ndarray:
+            yield prefix + field.name
+        elif isinstance(field.type, type) and issubclass(field.type, msgspec.Struct):
+            yield from _arrays(field.type, f"{prefix}{field.name}.")
+
+
+_ARRAYS: dict[type, tuple[Callable[[object], object], ...]] = {
+    kind: tuple(attrgetter(name) for name in _arrays(kind)) for kind in get_args(Message)
+}
 
 
 def _due(task: Task) -> tuple[tuple[Component, ...], ...]:

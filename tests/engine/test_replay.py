@@ -103,6 +103,13 @@ def test_a_component_that_answers_with_nonsense_is_named(tmp_path: Path, street:
         driven(scenario_file(tmp_path, street), stack=f"small_stacks:{stack}")
 
 
+@pytest.mark.parametrize(("stack", "cycle"), [("buffering_planning", 1), ("scribbling_planning", 0)])
+def test_a_component_that_writes_to_a_message_is_named(tmp_path: Path, street: Path, stack: str, cycle: int) -> None:
+    """Else the record would show what was never said."""
+    with pytest.raises(StackError, match=rf"planning raised ValueError: .*not to be written to\) in cycle {cycle} "):
+        driven(scenario_file(tmp_path, street), stack=f"small_stacks:{stack}")
+
+
 def test_a_failing_stack_is_an_unresolved_glimpse_with_its_reason(tmp_path: Path, street: Path) -> None:
     engine = ReplayEngine(street, StackSource("small_stacks:raising_planning"), 1, TIMEOUT)
     (found,) = engine.glimpses(tasks(scenario_file(tmp_path, street), 1), lambda _row, _answer: None)
