@@ -13,6 +13,7 @@ from dvca_sumo.screen.judging import Fault, Judged
 from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.screening import Screening, Setting
 from dvca_sumo.screen.summary import DriverSummary, Quartiles, summary_of
+from dvca_sumo.screen.trips import Draw
 
 SCHEMA = 1
 _ALONE = {True: "yes", False: "no", None: "not known"}
@@ -65,10 +66,8 @@ def has_gaps(screening: Screening) -> bool:
 def terminal_text(screening: Screening) -> str:
     """The tables for a terminal."""
     ads, sumo = _summaries(screening)
-    wanted, drawn = screening.setting.egos, len(screening.draw.trips)
     parts = [
-        f"{drawn} trips drawn of {screening.draw.departures} departures"
-        + (f" (no more than that of {wanted} asked for)" if drawn < wanted else ""),
+        _drawn(screening.draw, screening.setting.egos),
         _table([["", "ADS", "SUMO's driver"], *([name, say(ads), say(sumo)] for name, say in _ROWS)]),
         "Violations of the driver's own doing per 1 000 km and per 100 trips, 95 % intervals (others', simulator's)\n"
         + _table([["oracle", "ADS", "", "", "SUMO's driver", "", ""], *_by_oracle(ads, sumo)]),
@@ -97,6 +96,15 @@ def terminal_text(screening: Screening) -> str:
     if untold:
         parts.append("Oracles that could not tell, and on how many trips\n" + "\n".join(untold))
     return "\n\n".join(parts)
+
+
+def _drawn(draw: Draw, wanted: int) -> str:
+    drawn = len(draw.trips)
+    said = f"{drawn} trips drawn of {draw.departures} departures"
+    if drawn == wanted:
+        return said
+    refused = "".join(f"; {count} {reason}" for reason, count in draw.refused.items())
+    return f"{said} (no more than that of {wanted} asked for{refused})"
 
 
 def command(setting: Setting, ego: str) -> str:

@@ -196,6 +196,13 @@ def test_the_text_puts_both_drivers_side_by_side(reckless: Screening) -> None:
     assert "2 trips drawn of 2 departures (no more than that of 3 asked for)" in text
 
 
+def test_where_there_are_fewer_trips_than_asked_for_it_is_told_why(reckless: Screening) -> None:
+    draw = msgspec.structs.replace(reckless.draw, departures=5, refused={"of class bus": 2, "shorter than 100 m": 1})
+    text = terminal_text(msgspec.structs.replace(reckless, draw=draw))
+    said = "2 trips drawn of 5 departures (no more than that of 3 asked for; 2 of class bus; 1 shorter than 100 m)"
+    assert text.splitlines()[0] == said
+
+
 def test_trips_after_the_configurations_end_are_driven_where_an_end_after_it_is_asked_for(
     tmp_path: Path, street: Path
 ) -> None:
