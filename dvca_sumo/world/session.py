@@ -49,6 +49,10 @@ _MATCHED_WITHIN = 30.0  # [m] of a lane an ego is on the road; SUMO looks at eve
 _GIVES_UP = (libsumo.TraCIException, libsumo.FatalTraCIError)
 _INDICATORS = {1: 0b10, 0: 0, -1: 0b1}  # by the side they tell; bits of SUMO's signals
 _BRAKE_LIGHT = 0b1000
+# How SUMO finds the lane of an ego, which may leave the net: among all, or those of its route. In the first way it
+# replaces the route of one that it finds beside it, adds the stops of the vehicle's definition to the new one, and
+# gives up where they are not on that.
+_BY_ALL_LANES, _BY_ROUTE = 2, 3
 _TOLD_ANEW = 0.2  # [m] of difference in length
 _STANDING = 0.1  # [m/s] up to which SUMO's vehicles show their brake lights
 _HELD = 0.3  # [m] within the edge of the lane that an ego is held on
@@ -137,6 +141,7 @@ class _Adopted(msgspec.Struct):
     width: float  # [m]
     fastest: float  # [m/s] that it can drive
     length: float  # [m] of lane that it takes up
+    matching: int  # how SUMO finds its lane
     goes: bool = True  # means to, when it can
     shadows: tuple[str, ...] = ()  # lanes on which one stands for it
 
@@ -283,7 +288,8 @@ class Session:
     def adopt(self, entry: Entry, radius: float) -> None:
         """Take an inserted vehicle out of SUMO's hands; watch what is within `radius` [m] of it.
 
-        A standing ego must not be teleported out of a jam, so it gets a type of its own.
+        A standing ego must not be teleported out of a jam, so it gets a type of its own. One that had stops of its own
+        is to SUMO on its route or nowhere: its drivers do not see it on other roads.
         """
         of = libsumo.vehicle
         of.setType(entry.ego, NEVER_TELEPORTED)
@@ -293,8 +299,9 @@ class Session:
         of.setEmergencyDecel(entry.ego, _ANY_BRAKING)
         itinerary = Itinerary(entry.edges, of.getRouteID(entry.ego))
         fastest = of.getMaxSpeed(entry.ego)
+        matching = _BY_ROUTE if entry.stops else _BY_ALL_LANES
         self._adopted[entry.ego] = _Adopted(
-            itinerary, Setback(), Inset(), Lingering(), entry.width, fastest, entry.length
+            itinerary, Setback(), Inset(), Lingering(), entry.width, fastest, entry.length, matching
         )
         self._vehicle(entry.ego)  # the length it has, before SUMO is told what it takes up
         self.watch(entry.ego, radius)
@@ -349,7 +356,7 @@ class Session:
         adopted.itinerary.reach(edge)
         if found and libsumo.vehicle.getRouteID(ego) != adopted.itinerary.route:
             self._remind(ego, found)
-        libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, angle, keepRoute=2, matchThreshold=_MATCHED_WITHIN)
+        libsumo.vehicle.moveToXY(ego, edge, int(index), x, y, angle, adopted.matching, _MATCHED_WITHIN)
         # SUMO derives a wrong speed on junction and opposite lanes; drivers behind must react to the true one.
         libsumo.vehicle.setPreviousSpeed(ego, truth.speed, truth.acceleration)
         # SUMO's own would tell what its driver, overruled, meant to do.

@@ -392,6 +392,40 @@ def test_an_ego_passes_its_stops_as_a_vehicle_on_the_road(
     assert in_child(job) == [{("bc", 0, 0)}, pytest.approx(0.0)]
 
 
+@pytest.mark.parametrize(
+    ("edges", "found"),
+    [("ab", ""), ("ab bn", ""), ("ab bc", "bc_0"), ("ab ba", "")],
+    ids=["past its last edge", "straight on where it was to turn", "over the junction", "where it was to turn back"],
+)
+@pytest.mark.parametrize(
+    "stop",
+    [
+        'lane="ab_0" endPos="170" duration="9"',
+        'lane="ab_0" endPos="170" speed="3"',
+        'busStop="market" duration="9"',
+        'parkingArea="yard" duration="9"',
+    ],
+)
+def test_an_ego_that_had_stops_goes_where_it_goes_and_its_route_stays(
+    tmp_path: Path, street: Path, stop: str, edges: str, found: str
+) -> None:
+    """Wherever SUMO found it beside its route, it would add the stops of its definition again, and give up."""
+    ego = f'<vehicle id="ego" depart="0" departPos="150"><route edges="{edges}"/><stop {stop}/></vehicle>'
+    places = PLACES.replace("bc_0", "ab_0").replace('"40"', '"155"').replace('"60"', '"175"')
+    config = scenario_file(tmp_path, street, ego, places)
+    last = watched(config, 120, speed=10.0)[-1]
+    assert last.ego.x + last.shape.front == pytest.approx(270.0, abs=2.0)
+
+    def question(sumo: Any) -> Any:
+        of = sumo.vehicle
+        return of.getPosition("ego"), of.getRoute("ego"), of.getLaneID("ego"), of.getStops("ego")
+
+    place, route, lane, stops = asked(config, 120, question, speed=10.0)
+    assert place == pytest.approx((last.ego.x + last.shape.front, last.ego.y), abs=0.01)
+    assert (route, stops) == (tuple(edges.split()), ())
+    assert lane == found
+
+
 @pytest.mark.parametrize("step", ["1", "0.5", "0.05"])
 @pytest.mark.parametrize(("configured", "interval"), [({}, 0.1), ({"default__action_step_length": "0.7"}, 0.7)])
 def test_drivers_act_at_every_world_step_unless_the_scenario_has_them_act_at_intervals(
