@@ -43,9 +43,11 @@ class Places:
     Remembers the last place only. Oracles that share an instance cost one projection a moment.
     """
 
-    def __init__(self, route: Route, roadmap: RoadMap) -> None:
+    def __init__(self, route: Route, roadmap: RoadMap, signed_lanes: frozenset[str] = frozenset()) -> None:
+        """Places along `route`; the limit of `signed_lanes` may be another than the route's, at any time."""
         self.route = route
         self.roadmap = roadmap
+        self.signed_lanes = signed_lanes
         self._last: Place | None = None
         self._stations = route.line.stations.tolist()
         self._neighbours: tuple[ObjectsTruth, Neighbours] | None = None

@@ -4,7 +4,7 @@ import numpy as np
 
 from dvca_sumo.messages import Floats
 from dvca_sumo.oracles.findings import Findings
-from dvca_sumo.oracles.place import Places
+from dvca_sumo.oracles.place import Place, Places
 from dvca_sumo.roadmap import Route
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import Moment
@@ -16,7 +16,7 @@ class SpeedLimit:
 
     A slower lane counts from the line on where the front bumper enters it. Inside a junction the limit
     of the lane before holds, where that is higher: SUMO's speeds of turns are driving advice, not law.
-    Cannot tell of the time that the ego was off its route.
+    Cannot tell of the time that the ego was off its route, nor of lanes where variable signs set the limit.
     """
 
     kind = "speed_limit"
@@ -27,15 +27,17 @@ class SpeedLimit:
         self._tolerance = thresholds.speed_tolerance
         self._dwell = thresholds.speed_dwell
         self._limits = _legal_limits(places.route)
+        self._signed = _signed(places)
         self._since: float | None = None  # [s] of the current episode
         self._is_reported = False
-        self._off_route_at: float | None = None
+        self._blind = ""  # the first time that it could not tell, and why
 
     def observe(self, moment: Moment) -> Violation | None:
         """See `Oracle`."""
         place = self._places.at(moment)
-        if not place.is_on_route:
-            self._off_route_at = moment.time if self._off_route_at is None else self._off_route_at
+        why = self._unknown(place)
+        if why:
+            self._blind = self._blind or f"{why} at {moment.time:.1f} s"
             self._since = None
             return None
         limit = float(self._limits[place.row])
@@ -51,9 +53,23 @@ class SpeedLimit:
 
     def conclude(self, ended: Ending) -> Judgement:  # noqa: ARG002  the answer holds for whatever part was seen
         """See `Oracle`."""
-        if self._off_route_at is None:
-            return self._findings.judgement()
-        return self._findings.judgement(f"the ego was off its route at {self._off_route_at:.1f} s")
+        return self._findings.judgement(self._blind)
+
+    def _unknown(self, place: Place) -> str:
+        """Why the limit at a place is not known; empty if it is."""
+        if not place.is_on_route:
+            return "the ego was off its route"
+        lane = self._signed[place.row]
+        return f"the ego was on lane {lane}, whose limit a variable sign sets," if lane else ""
+
+
+def _signed(places: Places) -> list[str]:
+    """For each row of the route the lane with a variable sign that sets the limit there; empty without one."""
+    lanes: list[str] = []
+    for lane in places.route.lane_ids:
+        is_within = lane.startswith(":") and lane not in places.signed_lanes
+        lanes.append(lanes[-1] if is_within and lanes else lane if lane in places.signed_lanes else "")
+    return lanes
 
 
 def _legal_limits(route: Route) -> Floats:

@@ -84,7 +84,7 @@ class Departing:
             ScenarioError: A threshold is none.
         """
         thresholds = _thresholds(entry)
-        places = Places(route, self._roadmap_of(entry.vehicle_class))
+        places = Places(route, self._roadmap_of(entry.vehicle_class), self.definitions.signed_lanes)
         return Judging(judges(places, thresholds), thresholds, places)
 
     def latest(self, entry: Entry, route: Route) -> float:

@@ -10,6 +10,7 @@ from dvca_sumo.scenario.texts import texts_within
 
 AUTO = "auto"
 _VEHICLE = re.compile(r"<\s*(vehicle|trip|flow)\b[^>]*?\bid\s*=\s*[\"']([^\"']*)[\"']")
+_SIGN = re.compile(r"<\s*variableSpeedSign\b[^>]*?\blanes\s*=\s*[\"']([^\"']*)")
 _LISTED = 5
 
 
@@ -50,7 +51,7 @@ def find_ego(configuration: Configuration, asked: str | None) -> str:
 
 
 class Definitions:
-    """How a scenario's files define its vehicles: read once, asked about many."""
+    """How a scenario's files define its vehicles, and where signs change the limit: read once, asked about many."""
 
     def __init__(self, configuration: Configuration) -> None:
         """Read them.
@@ -61,11 +62,14 @@ class Definitions:
         self._tags: dict[str, str] = {}  # first tag of each vehicle and trip, by name
         self._flows: dict[str, str] = {}
         self.parameters: list[Parameter] = []
+        signed: set[str] = set()
         for path, text in texts_within((*configuration.routes, *configuration.additionals)):
             for match in _VEHICLE.finditer(text):
                 tags = self._flows if match.group(1) == "flow" else self._tags
                 tags.setdefault(match.group(2), text[match.start() : text.index(">", match.start())])
             self.parameters += parameters_within(text, path)
+            signed.update(*map(str.split, _SIGN.findall(text)))
+        self.signed_lanes = frozenset(signed)  # under variable speed signs
 
     def has(self, vehicle: str) -> bool:
         """Whether `--ego` accepts that name."""

@@ -132,9 +132,10 @@ def judged(
     route: Route | None = None,
     ended: Ending = Ending.TIME_OVER,
     thresholds: Thresholds | None = None,
+    signed_lanes: frozenset[str] = frozenset(),
 ) -> Judgement:
     """The answer of one oracle for a whole run."""
-    places = Places(straight_road() if route is None else route, cast("RoadMap", BareMap()))
+    places = Places(straight_road() if route is None else route, cast("RoadMap", BareMap()), signed_lanes)
     fold = oracle(places, Thresholds() if thresholds is None else thresholds)
     for each in moments:
         fold.observe(each)

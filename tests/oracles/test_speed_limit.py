@@ -1,3 +1,5 @@
+import math
+
 import pytest
 from oracle_scenes import drive, judged, moment, straight_road
 
@@ -40,6 +42,23 @@ def test_the_driving_advice_inside_a_junction_is_no_limit() -> None:
     inside = straight_road(limits=limits, lane=lambda station: ":c_0_0" if 100.0 <= station < 120.0 else "in_0")
     assert judged(SpeedLimit, drive(60.0, 140.0, 10.0), inside).answer is Answer.KEPT
     assert judged(SpeedLimit, drive(60.0, 140.0, 10.0), straight_road(limits=limits)).answer is Answer.VIOLATED
+
+
+@pytest.mark.parametrize("speed", [10.0, 20.0])
+def test_it_cannot_tell_the_limit_that_a_variable_sign_sets(speed: float) -> None:
+    """Nor within the junction after such a lane, where the limit of the lane before holds."""
+    lanes = [(100.0, "in_0"), (120.0, "signed_0"), (140.0, ":c_0_0"), (math.inf, "out_0")]
+    route = straight_road(lane=lambda station: next(lane for end, lane in lanes if station < end))
+    signed = frozenset({"signed_0"})
+    for begin, end, answer in ((60.0, 99.0, None), (101.0, 119.0, "1"), (121.0, 139.0, "1"), (141.0, 180.0, None)):
+        found = judged(SpeedLimit, drive(begin, end, speed), route, signed_lanes=signed)
+        if answer:
+            assert (found.answer, found.violations) == (Answer.UNKNOWN, ())
+            assert found.reason == "the ego was on lane signed_0, whose limit a variable sign sets, at 0.0 s"
+        else:
+            assert found.answer is (Answer.KEPT if speed < 13.9 else Answer.VIOLATED)
+    whole = judged(SpeedLimit, drive(60.0, 180.0, 10.0), route, signed_lanes=signed)
+    assert (whole.answer, whole.reason[-10:]) == (Answer.UNKNOWN, ", at 4.0 s")
 
 
 def test_it_cannot_tell_the_limit_off_the_route() -> None:

@@ -203,6 +203,13 @@ def test_auto_takes_a_trip_that_is_long_enough_to_an_end_that_is_known(tmp_path:
     assert record.route.destination - record.route.start > 500.0
 
 
+def test_whether_a_variable_signs_limit_was_kept_is_not_known(tmp_path: Path, street: Path) -> None:
+    sign = '<variableSpeedSign id="v" lanes="bc_0 bc_1"><step time="0" speed="5"/></variableSpeedSign>'
+    record = driven(scenario_file(tmp_path, street, additional=sign))
+    unknown = {judgement.kind: judgement.reason for judgement in record.judgements if judgement.answer == "unknown"}
+    assert unknown == {"speed_limit": "the ego was on lane bc_0, whose limit a variable sign sets, at 0.1 s"}
+
+
 def test_auto_does_not_take_a_short_trip(tmp_path: Path, street: Path) -> None:
     flow = '<flow id="short" begin="0" period="5" number="20"><route edges="nb bs"/></flow>'
     with pytest.raises(ScenarioError, match="no vehicle fit to be the ego departs between 0 s and"):

@@ -184,3 +184,10 @@ def test_an_arrival_edge_that_sumo_draws_is_refused(tmp_path: Path, net: Path) -
     config = scenario_file(tmp_path, net, '<vehicle id="ego" arrivalEdge="random"/>')
     with pytest.raises(ScenarioError, match=r"arrivalEdge of ego is no edge: 'random' \(allowed: its number along"):
         Definitions(read_configuration(config)).arrival_row("ego", 5)
+
+
+def test_lanes_under_variable_speed_signs_are_found_in_all_files(tmp_path: Path, net: Path) -> None:
+    (tmp_path / "more.xml").write_text('<additional><variableSpeedSign lanes="c_0" id="u" file="x"/></additional>')
+    signs = '<variableSpeedSign id="v" lanes="a_0  b_1"><step time="0" speed="5"/></variableSpeedSign>'
+    config = scenario_file(tmp_path, net, additional=f'{signs}<include href="more.xml"/>')
+    assert Definitions(read_configuration(config)).signed_lanes == {"a_0", "b_1", "c_0"}
