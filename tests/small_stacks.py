@@ -92,7 +92,7 @@ wild_control = partial(
     spoilt, component="control", call=10 * RAISING_CYCLE, act=lambda: ControlCommand(0.0, float("nan"), 0.0)
 )
 hanging = partial(spoilt, component="planning", call=5, act=signal.pause)
-leaving = partial(spoilt, component="planning", call=5, act=partial(sys.exit, 3))
+leaving = partial(spoilt, component="planning", call=5, act=partial(os._exit, 3))
 
 
 def buffering_planning(context: StackContext) -> Stack:
