@@ -88,6 +88,12 @@ raising_control = partial(spoilt, component="control", call=10 * RAISING_CYCLE, 
 
 silent_planning = partial(spoilt, component="planning", call=RAISING_CYCLE, act=lambda: None)
 wordy_control = partial(spoilt, component="control", call=10 * RAISING_CYCLE, act=lambda: "full speed ahead")
+lost_localization = partial(
+    spoilt,
+    component="localization",
+    call=10 * RAISING_CYCLE,
+    act=lambda: LocalizationEstimate(0.0, float("nan"), 0.0, 0.0, 0.0, 0.0, 0.0),
+)
 wild_control = partial(
     spoilt, component="control", call=10 * RAISING_CYCLE, act=lambda: ControlCommand(0.0, float("nan"), 0.0)
 )

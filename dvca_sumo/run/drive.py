@@ -244,7 +244,12 @@ class Drive:
         truth, sensors = self._path[-1], self._stack.sensors
         cycle, phase = divmod(self._tick, TICKS_PER_STEP)
         fix = sensors.fix(truth, cycle) if phase == 0 else None
-        return _checked(self._stack.localization.step(sensors.odometry(truth, self._tick), fix), LocalizationEstimate)
+        step = self._stack.localization.step
+        estimate = _checked(step(sensors.odometry(truth, self._tick), fix), LocalizationEstimate)
+        pose, motion = estimate.x + estimate.y + estimate.heading, estimate.speed + estimate.acceleration
+        if not math.isfinite(pose + motion + estimate.yaw_rate):
+            raise ValueError("its estimate holds a number that is not finite")
+        return estimate
 
     def _perceive(self, moment: Moment) -> Message | None:
         believed = self._channels.localization

@@ -95,6 +95,10 @@ def test_a_component_that_raises_is_named_with_its_cycle_and_words(
     [
         ("silent_planning", "planning raised TypeError: its step returned NoneType, not Trajectory in cycle"),
         ("wordy_control", "control raised TypeError: its step returned str, not ControlCommand in cycle"),
+        (
+            "lost_localization",
+            "localization raised ValueError: its estimate holds a number that is not finite in cycle",
+        ),
         ("wild_control", "control command at .* must be finite.* in cycle"),
     ],
 )
