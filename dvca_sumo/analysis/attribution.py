@@ -19,7 +19,7 @@ from dvca_sumo.analysis.components import (
     undecided,
 )
 from dvca_sumo.analysis.differences import Difference, differences
-from dvca_sumo.analysis.dtest import Dtest, Probe, Question, Setting
+from dvca_sumo.analysis.dtest import Dtest, Probe, Question, Setting, could_not_tell
 from dvca_sumo.analysis.last_chance import UndecidedError, decisive, is_by_luck
 from dvca_sumo.analysis.messages import MessageAnswer
 from dvca_sumo.analysis.specification import PlanningFinding, first_unusable_plan, first_violating_plan
@@ -121,6 +121,7 @@ def setting_of(request: Request, record: Record, violation: Violation) -> Settin
         start=record.start,
         is_mission=is_mission,
         jitters=_jitters(request),
+        untold=tuple(one.kind for one in could_not_tell(record.judgements)),
     )
 
 

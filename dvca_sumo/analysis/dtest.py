@@ -17,7 +17,7 @@ from dvca_sumo.messages import Component
 from dvca_sumo.record import TICK, MessageMark
 from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import Scenario
-from dvca_sumo.violations import Answer, Violation
+from dvca_sumo.violations import Answer, Judgement, Violation
 
 _QUOTED_LINES = 3  # of a failed run's standard error
 
@@ -59,6 +59,7 @@ class Setting(msgspec.Struct, frozen=True):
     start: float  # [s] the ego's departure
     is_mission: bool  # the factual violation is one that only a finished drive can answer
     jitters: tuple[int | None, ...]  # one run of each question for each; (None,) in exact mode
+    untold: tuple[str, ...] = ()  # oracles that could not tell of the factual run: no probe is held to what they say
 
 
 class Dtest:
@@ -179,12 +180,17 @@ def outcome_of(answer: Glimpse, setting: Setting) -> tuple[Outcome, str]:
     """What a counterfactual run says, and why it says nothing when it is UNRESOLVED."""
     if answer.violations:
         return Outcome.VIOLATES, ""
-    blind = [one for one in answer.judgements if one.answer is Answer.UNKNOWN and one.kind not in _MISSION]
+    blind = [one for one in could_not_tell(answer.judgements) if one.kind not in setting.untold]
     if setting.is_mission:
-        blind = [one for one in answer.judgements if one.answer is Answer.UNKNOWN]
+        blind += [one for one in answer.judgements if one.answer is Answer.UNKNOWN and one.kind in _MISSION]
     if blind:
         return Outcome.UNRESOLVED, "; ".join(f"{one.kind}: {one.reason}" for one in blind)
     return Outcome.SAFE, ""
+
+
+def could_not_tell(judgements: Sequence[Judgement]) -> list[Judgement]:
+    """What oracles could not tell, whose rules hold all along a drive, however early it ends."""
+    return [one for one in judgements if one.answer is Answer.UNKNOWN and one.kind not in _MISSION]
 
 
 _MISSION = ("destination", "no_progress")  # an oracle of these cannot tell of a run stopped early: no reason for doubt

@@ -68,6 +68,20 @@ def test_a_run_without_a_violation_that_an_oracle_could_not_judge_is_not_called_
     assert "it was dark" in found.reason
 
 
+@pytest.mark.parametrize(("kind", "verdict"), [("speed_limit", Verdict.COMPONENT), ("red_light", Verdict.UNRESOLVED)])
+def test_what_could_not_be_told_of_the_factual_run_is_not_asked_of_others(kind: str, verdict: Verdict) -> None:
+    """As of a limit that a variable sign sets on the road of both."""
+    record = replace(faulty_drive(), judgements=(unknown("speed_limit"),))
+    enough = answering(record, {PERCEPTION: FATAL})
+
+    def answers(task: Task) -> Glimpse | Failure:
+        answer = enough(task)
+        assert isinstance(answer, Glimpse)
+        return replace(answer, judgements=(*answer.judgements, unknown(kind)))
+
+    assert attributed(record, answers).verdict is verdict
+
+
 def test_the_responsible_component_and_its_message_are_found_and_proven() -> None:
     record = faulty_drive()
     found = attributed(record, answering(record, {PERCEPTION: FATAL}), faults=(FAULTY,))
