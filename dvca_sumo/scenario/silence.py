@@ -31,7 +31,14 @@ WRITTEN = {
     "timedEvent": "dest",
 }
 # Element -> attribute with the path of a file that SUMO reads.
-_READ = {"variableSpeedSign": "file", "rerouter": "file", "include": "href", "poly": "imgFile", "poi": "imgFile"}
+_READ = {
+    "variableSpeedSign": "file",
+    "rerouter": "file",
+    "calibrator": "file",
+    "include": "href",
+    "poly": "imgFile",
+    "poi": "imgFile",
+}
 # Keys of parameters with the path of a file that SUMO writes.
 _LIGHT_FILE = "file"  # of an actuated traffic light: where its own detectors write
 _DEVICE_FILES = ("device.ssm.file", "device.toc.file")  # of vehicles and their types

@@ -46,8 +46,14 @@ def test_the_file_of_every_kind_of_detector_goes_nowhere(
 
 
 def test_what_a_copied_file_reads_stays_where_it_is(tmp_path: Path, scratch: Path) -> None:
-    root = copied(written(tmp_path, '<e1Detector file="x"/><rerouter file="r.xml"/><poly imgFile="p.png"/>'), scratch)
+    root = copied(
+        written(
+            tmp_path, '<e1Detector file="x"/><rerouter file="r.xml"/><calibrator file="c.xml"/><poly imgFile="p.png"/>'
+        ),
+        scratch,
+    )
     assert only(root, "rerouter").get("file") == str(tmp_path / "r.xml")
+    assert only(root, "calibrator").get("file") == str(tmp_path / "c.xml")
     assert only(root, "poly").get("imgFile") == str(tmp_path / "p.png")
 
 
