@@ -1,5 +1,7 @@
 """How near bodies are to the ego's way by their outlines, where their extents are not enough to tell."""
 
+import math
+
 import numpy as np
 
 from dvca_sumo.geometry.boxes import outlines
@@ -16,16 +18,18 @@ _NOBODY = (np.zeros(0, dtype=np.int64), np.zeros((0, 1)), np.zeros((0, 1)))
 
 
 def hidden_depths(scene: Scene, window: Window) -> Floats:
-    """How much nearer to the line each future (h,) may come than its extents, which are of where its middle is [m].
+    """How much nearer to the line each future (h, t) may come than its extents, which are of where its middle is [m].
 
     So much a line that bends comes nearer to a body within its length; 0 for one that is not long.
     """
     lengths, widths = scene.boxes[:, 3:].T
     if lengths.max(initial=0.0) <= _LONG:
-        return np.zeros(len(scene.owners))
-    squares = 0.25 * (lengths * lengths + widths * widths)
-    nearer = np.minimum(squares * float(np.abs(window.curvatures).max()), np.sqrt(squares))
-    found: Floats = np.where(lengths > _LONG, nearer, 0.0)[scene.owners]
+        return np.zeros((len(scene.owners), 1))
+    squares = np.where(lengths > _LONG, 0.25 * (lengths * lengths + widths * widths), 0.0)
+    reach = math.ceil(math.sqrt(float(squares.max())))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(np.abs(window.curvatures), reach), 2 * reach + 1)
+    of_owners = squares[scene.owners, None]
+    found: Floats = np.minimum(of_owners * around.max(axis=1)[scene.rows[0]], np.sqrt(of_owners))
     return found
 
 

@@ -87,7 +87,7 @@ def graph_of(
     gaps = futures.gaps(np.maximum.reduce(path.left.take(rows)), np.minimum.reduce(path.right.take(rows)))
     count, still = len(path.arcs), slice(scene.moving, None)
     hidden = hidden_depths(scene, window)
-    beyond, begins, ends = stood_beside(gaps[still], hidden[still], scene, window, path, config)
+    beyond, begins, ends = stood_beside(gaps[still], hidden[still, 0], scene, window, path, config)
     stretch = np.zeros(BEHIND + count)
     stretch[BEHIND:] = path.arcs - np.arange(count, dtype=np.float64)
     centres = futures.stations + stretch.take(rows[0])
@@ -96,7 +96,7 @@ def graph_of(
     margins = _margins(scene, gaps, window, route.crossings, speed, config)
     occupied = gaps < margins[:, None]
     if hidden[: scene.moving].any():
-        occupied[: scene.moving] |= gaps[: scene.moving] < (margins + hidden)[: scene.moving, None]
+        occupied[: scene.moving] |= (gaps < margins[:, None] + hidden)[: scene.moving]
     _let_leave(occupied, scene, gaps, config)
     occupied &= (high > -shape.rear_overhang) & (futures.stations < count - 2)
     for overpass in route.overpasses:
@@ -106,10 +106,9 @@ def graph_of(
     if grazing[0].size:
         begins, ends = low.copy(), high.copy()
         nearest, begins[grazing], ends[grazing] = moved_beside(scene, window, path, margins[grazing[0]], *grazing)
-        out = tuple(each[gaps[grazing] >= margins[grazing[0]]] for each in grazing)
-        low[out], high[out] = begins[out], ends[out]
+        is_ahead = (gaps[grazing] < margins[grazing[0]]) | (ends[grazing] > -shape.rear_overhang)
         gaps[grazing] = nearest
-        occupied[grazing] = nearest < margins[grazing[0]]
+        occupied[grazing] = (nearest < margins[grazing[0]]) & is_ahead
     if config.trusts_lane_room:
         occupied[still][_has_lane_room(scene, window, shape)] = False
     last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)

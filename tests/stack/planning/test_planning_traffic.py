@@ -1055,3 +1055,18 @@ def test_the_end_of_a_long_body_that_comes_into_a_bend_is_let_pass() -> None:
     bus = car(3, 52.0, 20.0, heading=-1.52, speed=0.9, size=(18.0, 2.5), lanes=("side_0",))
     driven = drive(road(curve_points(12.0, before=40.0, after=60.0)), 9.0, speed=6.0, station=10.0, actors=[bus])
     assert driven.clearances.min() > 0.5
+
+
+@pytest.mark.parametrize("speed", [4.0, 6.0])
+@pytest.mark.parametrize("radius", [12.0, 16.0, 30.0])
+def test_behind_a_long_one_that_cuts_the_bend_on_the_next_lane_the_ego_stays_without_haste(
+    radius: float, speed: float
+) -> None:
+    """In the bend its tail sweeps over the ego's lane; where its ends are along that, its outline does not tell."""
+    points = curve_points(radius, before=40.0, after=80.0)
+    line = Polyline(points)
+    beside = line.poses(line.stations, np.full(len(line), 3.2))[:, :2]
+    bus = Winding(3, ObjectClass.VEHICLE, 0.0, 0.0, speed=speed, size=(14.0, 2.5), line=Polyline(beside[14:]))
+    driven = drive(road(points, lanes_left=1), 14.0, speed=speed + 1.0, station=10.0, actors=[bus])
+    assert driven.clearances.min() > 0.5
+    assert driven.states[:, 5].min() > -3.0
