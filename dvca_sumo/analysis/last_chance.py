@@ -81,7 +81,7 @@ def is_by_luck(dtest: Dtest, record: Record, component: Component, messages: Mes
     Raises:
         UndecidedError: See there.
     """
-    is_early = time - messages.last_safe.time > PROMPT
+    is_early = time - messages.latest > PROMPT
     if not is_early and component is not Component.CONTROL:
         return False
     since = None if is_early else mark_before(record, SUBSTITUTABLE[0], time, FURTHER)

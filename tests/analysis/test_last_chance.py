@@ -135,6 +135,21 @@ def test_an_early_chance_is_luck_when_all_ideal_from_the_start_fail(*, is_enough
     assert is_by_luck(dtest, DRIVE, component, messages, TIME) is not is_enough_from_the_start
 
 
+def test_an_ego_that_rests_in_one_state_up_to_its_chance_has_no_early_one() -> None:
+    """With jitter the message that is named is the first of that state; the chance is there as long as the state."""
+    record = drive(duration=20.0, violations=(collision(TIME),))
+    record.stations = [min(station, 80.0) for station in record.stations]
+    dtest = asking(
+        FakeEngine(answering(record, {PERCEPTION: record.first_at(PERCEPTION, TIME - 0.3)})), jitters=(0, 1, 2)
+    )
+    answer = responsible_component(dtest, record, TIME)
+    component, messages = decisive(dtest, record, answer, TIME, TIME + 4.0, is_exact=False)
+    assert TIME - messages.last_safe.time > PROMPT > TIME - messages.latest
+    asked = len(dtest.probes)
+    assert not is_by_luck(dtest, record, component, messages, TIME)
+    assert len(dtest.probes) == asked
+
+
 @pytest.mark.parametrize("is_enough_further_back", [True, False])
 def test_of_control_it_is_asked_however_late_its_chance_was(*, is_enough_further_back: bool) -> None:
     enough = answering(DRIVE, {CONTROL: last(CONTROL, 0.4)})
