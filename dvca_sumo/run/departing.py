@@ -51,6 +51,7 @@ class Departing:
         Raises:
             ScenarioError: It never departs, or a vehicle's parameter is wrong; see `definitions`.
         """
+        _ = self.definitions  # what is wrong there makes no vehicle unfit, but the scenario
         return world.await_ego(Thresholds.__struct_fields__, self._is_fit)
 
     def entry(self, vehicle: str, world: World) -> Entry:

@@ -2,6 +2,7 @@
 
 import io
 import xml.etree.ElementTree as ET
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,15 +34,18 @@ class Parameter(NamedTuple):
         return said in _TRUE
 
 
-def parameters_within(text: str, path: Path) -> list[Parameter]:
+def parameters_within(text: str, path: Path) -> tuple[Parameter, ...]:
     """Those in the text of one file, in their order.
 
     Raises:
         ScenarioError: There are some, and the text is not well-formed.
     """
+    return _parsed(text, path) if _PREFIX in text else ()
+
+
+@cache  # a run's process finds here what its parent has parsed
+def _parsed(text: str, path: Path) -> tuple[Parameter, ...]:
     found: list[Parameter] = []
-    if _PREFIX not in text:
-        return found
     current: ET.Element | None = None
     try:
         for event, element in ET.iterparse(io.StringIO(text), ("start", "end")):  # noqa: S314 - the user's own file
@@ -54,4 +58,4 @@ def parameters_within(text: str, path: Path) -> list[Parameter]:
                     found.append(Parameter(vehicle, key.removeprefix(_PREFIX), element.get("value", "")))
     except ET.ParseError as error:
         raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
-    return found
+    return tuple(found)

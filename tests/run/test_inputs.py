@@ -191,6 +191,14 @@ def test_vehicles_flows_and_trips_as_egos(tmp_path: Path, street: Path, element:
     assert record.ego == name
 
 
+def test_auto_tells_a_parameter_that_there_is_not(tmp_path: Path, street: Path) -> None:
+    routes = (
+        '<vehicle id="car" depart="70"><route edges="ab bc cb ba"/><param key="dvca.safe_distanc" value="1"/></vehicle>'
+    )
+    with pytest.raises(ScenarioError, match=r"no parameter dvca\.safe_distanc .*did you mean dvca\.safe_distance"):
+        driven(scenario_file(tmp_path, street, routes), ego="auto")
+
+
 def test_auto_takes_a_trip_that_is_long_enough_to_an_end_that_is_known(tmp_path: Path, street: Path) -> None:
     def flow(name: str, edges: str, arrival: str = "") -> str:
         return f'<flow id="{name}" begin="0" period="5" number="20" {arrival}><route edges="{edges}"/></flow>'
