@@ -46,7 +46,7 @@ def make_folder(folder: Path) -> None:
 
 
 def deliver(text: str, files: Mapping[Path, str]) -> None:
-    """Print the text, then write each file whole or not at all: a reader never sees half of one.
+    """Write each file whole or not at all, a reader never seeing half of one, then print the text.
 
     Who stops reading what is printed loses nothing else by it: the files, the exit code.
 
@@ -54,9 +54,6 @@ def deliver(text: str, files: Mapping[Path, str]) -> None:
         OutputError: Something of it could not be printed or written; all the rest is.
     """
     lost = []
-    unprinted = _printed(text)
-    if unprinted is not None and not isinstance(unprinted, BrokenPipeError):
-        lost.append(f"standard output: {unprinted.strerror}")
     for path, content in files.items():
         draft = path.with_suffix(".part")
         try:
@@ -64,6 +61,9 @@ def deliver(text: str, files: Mapping[Path, str]) -> None:
             draft.replace(path)
         except OSError as error:
             lost.append(f"{path}: {error.strerror}")
+    unprinted = _printed(text)
+    if unprinted is not None and not isinstance(unprinted, BrokenPipeError):
+        lost.append(f"standard output: {unprinted.strerror}")
     if lost:
         raise OutputError(f"cannot write {', '.join(lost)}")
 

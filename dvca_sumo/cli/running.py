@@ -87,7 +87,8 @@ def run(
 
     \b
     Exit codes: 0 no violation; 1 violation, attributed; 2 usage; 3 bad input;
-    4 violation, but unresolved or not reproducible; 70 internal error; 130 interrupted.
+    4 violation, but unresolved or not reproducible, or an oracle could not tell;
+    70 internal error; 130 interrupted.
     """  # noqa: D301 - click wants the very character, not its escape
     if repeats is not None and not jitter:
         raise click.UsageError("--repeats goes with --jitter: in exact mode every run is the same")
