@@ -92,13 +92,13 @@ def attribute(drive: FactualDrive, progress: Progress | None = None, *, certify:
     """
     try:
         witness = drive.engine.witness if certify else None
-        return explain(drive.engine, drive.request, drive.record, progress or Progress(), witness, _afresh(drive))
+        progress, from_start = progress or Progress(), _is_copied(drive)
+        return explain(drive.engine, drive.request, drive.record, progress, witness, from_start=from_start)
     finally:
         drive.engine.close()
 
 
-def _afresh(drive: FactualDrive) -> Engine | None:
-    """Who repeats the run of a stack of the user's own, where the engine's own repetition begins with a copy of it."""
-    if drive.source.is_reference or drive.engine.fallback is not None or drive.engine.witness is drive.engine:
-        return None
-    return drive.engine.witness
+def _is_copied(drive: FactualDrive) -> bool:
+    """Whether a stack of the user's own drove, and counterfactuals begin with copies of it."""
+    is_branched = drive.engine.fallback is None and drive.engine.witness is not drive.engine
+    return is_branched and not drive.source.is_reference

@@ -131,14 +131,15 @@ def explain(
     record: Record,
     progress: Progress,
     witness: Engine | None = None,
-    afresh: Engine | None = None,
+    *,
+    from_start: bool = False,
 ) -> Attribution:
     """Explain the violation of a factual run, if there is one.
 
     A run without a violation of which an oracle could not tell is UNRESOLVED, not clean. With a
     `witness` the conclusion is asked of that engine too; where it disagrees, nothing is concluded.
-    With `afresh` the premise takes one more run, by that engine: one whose runs all start at time 0
-    sees what a stack has drawn before the first copy was made of it.
+    With `from_start` the premise takes one more run, from time 0: a copy of a run repeats what its stack
+    drew before it was made.
 
     Raises:
         AttributionStoppedError: The user interrupted it.
@@ -154,7 +155,7 @@ def explain(
         setting = setting_of(request, record, principal(record.violations))
         asked.append(Dtest(engine, setting, progress.probe))
         found = replace(found, until=setting.stop.at)
-        for answer in _steps(found, engine, asked[0], request, afresh):
+        for answer in _steps(found, engine, asked[0], request, from_start=from_start):
             found = answer
         if witness is not None:
             asked.append(Dtest(witness, setting, progress.probe, len(asked[0].probes)))
@@ -196,11 +197,11 @@ def _factual_task(request: Request) -> Task:
 
 
 def _steps(
-    found: Attribution, engine: Engine, dtest: Dtest, request: Request, afresh: Engine | None
+    found: Attribution, engine: Engine, dtest: Dtest, request: Request, *, from_start: bool
 ) -> Iterator[Attribution]:
     """The answer after each step of Algorithm 1."""
     assert found.violation is not None  # or there would be nothing to explain
-    doubt = _premise(engine, dtest, _factual_task(request), found, afresh)
+    doubt = _premise(engine, dtest, _factual_task(request), found, from_start=from_start)
     if doubt:
         yield replace(found, verdict=Verdict.NOT_REPRODUCIBLE, is_reproducible=False, reason=doubt)
         return
@@ -213,7 +214,7 @@ def _steps(
         yield _decided(found, dtest, engine, is_exact=request.repeats is None)
 
 
-def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution, afresh: Engine | None) -> str:
+def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution, *, from_start: bool) -> str:
     """Why the violation does not reproduce; empty when it does."""
     outcome = dtest.ask(Question(()))
     if outcome is not Outcome.VIOLATES and factual.jitter is not None:
@@ -225,9 +226,9 @@ def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution, af
     is_same = probe.steps > 0 and digests[probe.steps - 1 : probe.steps] == [probe.last_step]
     if is_same and outcome is Outcome.SAFE:
         return f"the repeated run is the same, but shows no violation until {found.until:.1f} s"
-    if factual.jitter is not None or (is_same and afresh is None):
+    if factual.jitter is not None or (is_same and not from_start):
         return ""
-    return _differing(afresh or engine, factual, found.record, is_known=not is_same)
+    return _differing(engine, factual, found.record, is_known=not is_same)
 
 
 def _differing(engine: Engine, factual: Task, record: Record, *, is_known: bool) -> str:

@@ -250,9 +250,9 @@ def attributed(
     repeats: int | None = None,
     again: Sequence[Record | Exception] = (),
     witness: Answers | None = None,
-    afresh: Record | Exception | None = None,
+    from_start: bool = False,
 ) -> Attribution:
-    """The whole of an attribution; `again` is what further runs of the factual task leave, `afresh` one from time 0."""
+    """The whole of an attribution; `again` is what further runs of the factual task leave."""
     engine, request = FakeEngine(answers, again), Request(SCENARIO, faults, repeats)
-    from_start = None if afresh is None else FakeEngine(answers, [afresh])
-    return explain(engine, request, record, Progress(), None if witness is None else FakeEngine(witness), from_start)
+    second = None if witness is None else FakeEngine(witness)
+    return explain(engine, request, record, Progress(), second, from_start=from_start)

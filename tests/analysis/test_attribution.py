@@ -242,12 +242,12 @@ def test_a_repeated_run_that_ends_earlier_differs_from_there_on() -> None:
 def test_a_run_from_time_0_that_differs_does_not_reproduce_what_a_copy_repeats() -> None:
     record = faulty_drive()
     answers = answering(record, {PERCEPTION: FATAL})
-    assert attributed(record, answers, afresh=record).verdict is Verdict.COMPONENT
+    assert attributed(record, answers, again=[record], from_start=True).verdict is Verdict.COMPONENT
     other = replace(record, digests=[*record.digests[:7], b"other", *record.digests[8:]])
-    found = attributed(record, answers, afresh=other)
+    found = attributed(record, answers, again=[other], from_start=True)
     assert found.verdict is Verdict.NOT_REPRODUCIBLE
     assert f"first at {START + 0.7:.1f} s" in found.reason
-    failed = attributed(record, answers, afresh=StackError("planning raised ValueError"))
+    failed = attributed(record, answers, again=[StackError("planning raised ValueError")], from_start=True)
     assert failed.verdict is Verdict.NOT_REPRODUCIBLE
     assert "one more run failed: planning raised ValueError" in failed.reason
 
