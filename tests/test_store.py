@@ -90,7 +90,7 @@ def test_what_other_code_or_another_fault_has_found_is_not_believed(edited: str,
     """Who edits the driver or a fault and asks again in the same folder gets new answers."""
     copy = tmp_path / "dvca_sumo"
     shutil.copytree(folder("faults"), tmp_path / "faults")
-    shutil.copytree(Path(dvca_sumo.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(Path(dvca_sumo.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__", "faults"))
 
     def key() -> str:
         code = "from dvca_sumo.store import key_of; print(key_of(['question']))"
