@@ -12,7 +12,7 @@ from pathlib import Path
 
 from dvca_sumo.scenario.configuration import Configuration
 from dvca_sumo.scenario.errors import ScenarioError
-from dvca_sumo.scenario.texts import opened_text
+from dvca_sumo.scenario.texts import READ, opened_text
 
 # Element -> attribute with the path of a file that SUMO writes.
 WRITTEN = {
@@ -29,15 +29,6 @@ WRITTEN = {
     "vTypeProbe": "file",
     "calibrator": "output",
     "timedEvent": "dest",
-}
-# Element -> attribute with the path of a file that SUMO reads.
-_READ = {
-    "variableSpeedSign": "file",
-    "rerouter": "file",
-    "calibrator": "file",
-    "include": "href",
-    "poly": "imgFile",
-    "poi": "imgFile",
 }
 # Keys of parameters with the path of a file that SUMO writes.
 _LIGHT_FILE = "file"  # of an actuated traffic light: where its own detectors write
@@ -80,7 +71,7 @@ def _silenced(path: Path, folder: Path) -> Path:
         raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
     for number, element in enumerate(root.iter()):
         _silence(element)
-        read = _READ.get(element.tag)
+        read = READ.get(element.tag)
         source = element.get(read) if read is not None else None
         if read is not None and source:
             target = (path.parent / source).resolve()

@@ -11,7 +11,18 @@ from dvca_sumo.scenario.errors import ScenarioError
 _ENCODING = re.compile(rb"<\?xml[^>]*\bencoding\s*=\s*[\"']([A-Za-z0-9._-]+)")
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _INCLUDE = re.compile(r"<\s*include\b[^>]*?\bhref\s*=\s*[\"']([^\"']*)")
-_READ = re.compile(r"<\s*(?:include|rerouter|variableSpeedSign|calibrator)\b[^>]*?\b(?:href|file)\s*=\s*[\"']([^\"']+)")
+# Element -> attribute with the path of a file that SUMO reads.
+READ = {
+    "variableSpeedSign": "file",
+    "rerouter": "file",
+    "calibrator": "file",
+    "include": "href",
+    "poly": "imgFile",
+    "poi": "imgFile",
+}
+_NAMED = re.compile(
+    r"<\s*(?:" + "|".join(rf"{tag}\b[^>]*?\b{name}" for tag, name in READ.items()) + r")\s*=\s*[\"']([^\"']+)"
+)
 
 
 def opened_text(path: Path) -> str:
@@ -33,12 +44,12 @@ def opened_text(path: Path) -> str:
 
 
 def read_by(path: Path) -> tuple[Path, ...]:
-    """The files that a file has SUMO read besides it: what it includes, and steps of its signs and reroutings.
+    """The files that a file has SUMO read besides it, as `READ` says: what it includes for one.
 
     Raises:
         ScenarioError: The file cannot be read.
     """
-    named = ((path.parent / name).resolve() for name in _READ.findall(opened_text(path)))
+    named = ((path.parent / name).resolve() for name in _NAMED.findall(opened_text(path)))
     return tuple(one for one in dict.fromkeys(named) if one.is_file())
 
 
