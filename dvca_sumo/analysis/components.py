@@ -15,7 +15,7 @@ the whole-component question as well.
 
 import enum
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import msgspec
 
@@ -146,7 +146,7 @@ def concluded(all_ideal: Outcome, singles: dict[Component, Outcome], since: floa
 
     `since` [s] is from when on single substitutions were asked for: by default, from the start.
     """
-    enough = tuple(component for component in SUBSTITUTABLE if singles[component] is Outcome.SAFE)
+    enough = _enough(singles)
 
     def answer(verdict: Verdict, component: Component | None, reason: str) -> ComponentAnswer:
         others = tuple(one for one in enough if one is not component)
@@ -183,7 +183,7 @@ def named_instead(answer: ComponentAnswer, component: Component) -> ComponentAns
 
 def planning_named_instead(answer: ComponentAnswer) -> ComponentAnswer:
     """The same vector, where planning put out what nobody can follow: who saves the ego from that is not to blame."""
-    enough = tuple(one for one in SUBSTITUTABLE if answer.singles[one] is Outcome.SAFE)
+    enough = _enough(answer.singles)
     return msgspec.structs.replace(
         answer,
         verdict=Verdict.PLANNING,
@@ -195,7 +195,11 @@ def planning_named_instead(answer: ComponentAnswer) -> ComponentAnswer:
 
 def undecided(answer: ComponentAnswer, reason: str) -> ComponentAnswer:
     """The same vector, where a run that decides between those that are enough could not be told."""
-    enough = tuple(one for one in SUBSTITUTABLE if answer.singles[one] is Outcome.SAFE)
     return msgspec.structs.replace(
-        answer, verdict=Verdict.UNRESOLVED, component=None, alternatives=enough, reason=reason
+        answer, verdict=Verdict.UNRESOLVED, component=None, alternatives=_enough(answer.singles), reason=reason
     )
+
+
+def _enough(singles: Mapping[Component, Outcome]) -> tuple[Component, ...]:
+    """Those that prevent it alone."""
+    return tuple(one for one in SUBSTITUTABLE if singles[one] is Outcome.SAFE)
