@@ -89,9 +89,9 @@ class Departing:
         return Judging(judges(places, thresholds), thresholds, places)
 
     def latest(self, entry: Entry, route: Route) -> float:
-        """When a trip has to be over [s]: when patience is, or by the scenario's end, if nobody would be late for that.
+        """When a trip has to be over [s]: when patience is, or at the scenario's end, where that comes first.
 
-        Where the end comes sooner than who drives at the speed limits, it only cuts the trip off.
+        Not at an end that comes sooner than anybody arrives at the speed limits: that only cuts the trip off.
         """
         freely, end = free_flow(route), self._scenario.end
         patient = entry.time + patience(freely)
