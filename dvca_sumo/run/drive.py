@@ -1,10 +1,8 @@
 """One ego's closed loop: sense, five components, move, be judged."""
 
 import math
-from collections.abc import Callable, Iterator
 from functools import cached_property
-from operator import attrgetter
-from typing import NamedTuple, TypeVar, get_args, get_origin
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -25,6 +23,7 @@ from dvca_sumo.messages import (
 from dvca_sumo.oracles import Oracle, Places
 from dvca_sumo.oracles.no_progress import NoProgress
 from dvca_sumo.record import TICK, Digest, Execution, Record, moved_on
+from dvca_sumo.run.answers import checked, told
 from dvca_sumo.run.intervening import Intervening
 from dvca_sumo.run.task import Task
 from dvca_sumo.stack.reference import Stack, StackError
@@ -38,8 +37,6 @@ ARRIVED_WITHIN = 3.0  # [m]
 _LOST_BEYOND = 60.0  # [m] past its destination an ego will not come back
 _PHASE_STREAM = 101
 _CHANNELS = {component: component.value for component in COMPONENTS}  # an enum's value is slow to ask for
-
-Answer = TypeVar("Answer")
 
 
 class Channels:
@@ -210,7 +207,7 @@ class Drive:
             message = self._steps[component](moment)
         except (Exception, SystemExit) as error:  # a component has no business with the process, to end it neither
             cycle = self._tick // TICKS_PER_STEP
-            said = _said(error)
+            said = told(error)
             raise StackError(f"{component} raised {said} in cycle {cycle} ({self._path[-1].time:.2f} s)") from error
         if message is None:  # its input has not arrived yet
             return
@@ -245,7 +242,7 @@ class Drive:
         cycle, phase = divmod(self._tick, TICKS_PER_STEP)
         fix = sensors.fix(truth, cycle) if phase == 0 else None
         step = self._stack.localization.step
-        estimate = _checked(step(sensors.odometry(truth, self._tick), fix), LocalizationEstimate)
+        estimate = checked(step(sensors.odometry(truth, self._tick), fix), LocalizationEstimate)
         pose, motion = estimate.x + estimate.y + estimate.heading, estimate.speed + estimate.acceleration
         if not math.isfinite(pose + motion + estimate.yaw_rate):
             raise ValueError("its estimate holds a number that is not finite")
@@ -256,20 +253,20 @@ class Drive:
         if believed is None:
             return None
         detections = self._stack.sensors.detections(moved_on(moment, self._path[-1]), self._tick // TICKS_PER_STEP)
-        return _checked(self._stack.perception.step(detections, believed), TrackedObjects)
+        return checked(self._stack.perception.step(detections, believed), TrackedObjects)
 
     def _predict(self, moment: Moment) -> Message | None:  # noqa: ARG002
         tracked = self._channels.perception
         if tracked is None:
             return None
-        return _checked(self._stack.prediction.step(tracked), PredictedObjects)
+        return checked(self._stack.prediction.step(tracked), PredictedObjects)
 
     def _plan(self, moment: Moment) -> Message | None:  # noqa: ARG002
         channels = self._channels
         if channels.localization is None or channels.prediction is None or channels.perception is None:
             return None
         signals = channels.perception.signals
-        plan = _checked(self._stack.planning.step(channels.localization, channels.prediction, signals), Trajectory)
+        plan = checked(self._stack.planning.step(channels.localization, channels.prediction, signals), Trajectory)
         if not np.isfinite(plan.points).all():
             raise ValueError("its trajectory holds a number that is not finite")
         return plan
@@ -278,7 +275,7 @@ class Drive:
         believed = self._channels.localization
         if believed is None:
             return None
-        return _checked(self._stack.control.step(believed, self._channels.planning), ControlCommand)
+        return checked(self._stack.control.step(believed, self._channels.planning), ControlCommand)
 
     def _judge(self, moment: Moment) -> None:
         if moment.time > self._contact:
@@ -308,40 +305,6 @@ def _objects_in(message: Message) -> TrackedObjects | None:
     if isinstance(message, PredictedObjects):
         return message.objects
     return message if isinstance(message, TrackedObjects) else None
-
-
-def _checked(answer: object, kind: type[Answer]) -> Answer:
-    """A component's answer: a user's own stack may give anything.
-
-    Nobody can write to its arrays any more, be it through what they are views of: it is a message that was made.
-    """
-    if not isinstance(answer, kind):
-        raise TypeError(f"its step returned {type(answer).__name__}, not {kind.__name__}")
-    for array_of in _ARRAYS[kind]:
-        array = array_of(answer)
-        while isinstance(array, np.ndarray):
-            array.setflags(write=False)
-            array = array.base
-    return answer
-
-
-def _said(error: BaseException) -> str:
-    said = f"{type(error).__name__}: {error}"
-    return f"{said} (messages given or returned are not to be written to)" if "read-only" in said else said
-
-
-def _arrays(kind: type, prefix: str = "") -> Iterator[str]:
-    """Names of the arrays in a message of this kind, and in those that it holds."""
-    for field in msgspec.structs.fields(kind):
-        if get_origin(field.type) is np.ndarray:
-            yield prefix + field.name
-        elif isinstance(field.type, type) and issubclass(field.type, msgspec.Struct):
-            yield from _arrays(field.type, f"{prefix}{field.name}.")
-
-
-_ARRAYS: dict[type, tuple[Callable[[object], object], ...]] = {
-    kind: tuple(attrgetter(name) for name in _arrays(kind)) for kind in get_args(Message)
-}
 
 
 def _due(task: Task) -> tuple[tuple[Component, ...], ...]:
