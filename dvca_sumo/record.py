@@ -41,6 +41,7 @@ class Record(msgspec.Struct):
     ego: str
     stops: tuple[str, ...]  # the vehicle's own, which the ego did not make
     route: Route
+    signed_lanes: frozenset[str]  # whose limit may be another than the route's, at any time
     thresholds: Thresholds
     sensor_range: float  # [m] of the stack
     start: float  # [s] departure

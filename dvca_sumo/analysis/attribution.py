@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import msgspec
 from msgspec.structs import replace
 
+from dvca_sumo.analysis.at_fault import at_fault
 from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.analysis.certificate import Check, certified
 from dvca_sumo.analysis.components import (
@@ -28,6 +29,7 @@ from dvca_sumo.engine.protocol import Engine, RunFailedError
 from dvca_sumo.interventions import Fault, recorded_futures
 from dvca_sumo.messages import PREDICTION_TIMES, Component, MessageId
 from dvca_sumo.record import TICK, MessageMark, Record
+from dvca_sumo.responsibility.judging import Judged
 from dvca_sumo.run import StopRule, Task
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.stack.reference import StackError
@@ -72,6 +74,7 @@ class Attribution(msgspec.Struct, frozen=True):
     is_reproducible: bool
     reason: str
     until: float  # [s] see Setting
+    at_fault: tuple[Judged, ...] = ()  # whose doing violations of the record are, of those where that is known
     components: ComponentAnswer | None = None
     messages: MessageAnswer | None = None
     message: MessageMark | None = None
@@ -80,6 +83,10 @@ class Attribution(msgspec.Struct, frozen=True):
     evidence: tuple[Probe, ...] = ()  # the two adjacent probes
     planted: Planted | None = None
     certificate: tuple[Check, ...] = ()  # empty: not asked for
+
+    def judged(self, violation: Violation) -> Judged | None:
+        """Whose doing a violation of the record is; None where that is not known."""
+        return next((one for one in self.at_fault if one.violation == violation), None)
 
 
 class AttributionStoppedError(Exception):
@@ -152,6 +159,7 @@ def explain(
     found = replace(found, violation=principal(record.violations), verdict=Verdict.UNRESOLVED)
     asked: list[Dtest] = []
     try:
+        found = replace(found, at_fault=at_fault(record, engine.roadmap))
         setting = setting_of(request, record, principal(record.violations))
         asked.append(Dtest(engine, setting, progress.probe))
         found = replace(found, until=setting.stop.at)

@@ -10,11 +10,12 @@ from bisect import bisect_left
 
 import msgspec
 
+from dvca_sumo.analysis.at_fault import places_of
 from dvca_sumo.analysis.violating import is_same_family
 from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.frames import relative, transferred
 from dvca_sumo.messages import ACCELERATION, CURVATURE, HEADING, SPEED, Component, MessageId, Trajectory, X, Y
-from dvca_sumo.oracles import Places, judge, judges
+from dvca_sumo.oracles import judge, judges
 from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.oracles.no_progress import NoProgress
 from dvca_sumo.record import Execution, MessageMark, Record
@@ -47,7 +48,7 @@ def first_violating_plan(
     it is missing, does not begin where the ego is, or plans to stand without a reason.
     """
     executions = record.executions[Component.PLANNING]
-    waiting = NoProgress(Places(record.route, roadmap), thresholds)
+    waiting = NoProgress(places_of(record, roadmap), thresholds)
     for index, execution in enumerate(executions):
         mark = record.mark(MessageId(Component.PLANNING, index))
         if mark.time > violation.time:
@@ -117,7 +118,7 @@ def _breach(
     record: Record, roadmap: RoadMap, thresholds: Thresholds, trajectory: Trajectory, tick: int, violation: Violation
 ) -> str:
     moments = _driven(record, trajectory, tick)
-    for judgement in judge(moments, judges(Places(record.route, roadmap), thresholds), Ending.CUT):
+    for judgement in judge(moments, judges(places_of(record, roadmap), thresholds), Ending.CUT):
         for found in judgement.violations:
             if is_same_family(found.kind, violation) and found.object == violation.object:
                 return f"driven as planned it leads to {found.kind} in {found.time - moments[0].time:.1f} s"

@@ -54,13 +54,13 @@ def result_of(request: Request, source: StackSource, found: Attribution, timing:
         "bug": source.bug,
         "jitter": request.repeats is not None,
         "repeats": request.repeats or 1,
-        "violations": [violation_json(violation) for violation in record.violations],
+        "violations": [_violation(violation, found) for violation in record.violations],
         "judgements": [
             {"kind": one.kind, "answer": one.answer.value, "reason": one.reason} for one in record.judgements
         ],
         "verdict": found.verdict.value,
         "reason": found.reason,
-        "violation": None if found.violation is None else violation_json(found.violation),
+        "violation": None if found.violation is None else _violation(found.violation, found),
         "component": _component(found),
         "alternatives": [] if found.components is None else [one.value for one in found.components.alternatives],
         "substitutions": _substitutions(found),
@@ -103,6 +103,13 @@ def _fault(fault: Fault) -> Json:
         "parameters": dict(fault.parameters),
         "selection": selection,
     }
+
+
+def _violation(violation: Violation, found: Attribution) -> Json:
+    """One of the factual run, with whose doing it is."""
+    judged = found.judged(violation)
+    whose = {"fault": None, "reason": ""} if judged is None else {"fault": judged.fault.value, "reason": judged.reason}
+    return {**violation_json(violation), **whose}
 
 
 def violation_json(violation: Violation) -> Json:

@@ -10,6 +10,7 @@ from dvca_sumo.analysis.dtest import Probe
 from dvca_sumo.interventions import UNITS
 from dvca_sumo.record import MessageMark, Record
 from dvca_sumo.report.result import Timing
+from dvca_sumo.responsibility.judging import AtFault, Judged
 from dvca_sumo.stack.bugs import BUGS
 from dvca_sumo.violations import Contact, Violation
 
@@ -19,6 +20,7 @@ _CONTACTS = {
     Contact.ACTIVE_FRONT: "the ego ran into it",
     Contact.ACTIVE_SIDE: "the ego touched it with its side",
 }
+_WHOSE = {AtFault.OTHER: "the other one's", AtFault.SIMULATOR: "the simulator's, not the driver's"}
 _ANSWERS = {
     Outcome.SAFE: "safe: this alone prevents it",
     Outcome.VIOLATES: "still violates",
@@ -45,7 +47,7 @@ def _lines(found: Attribution, timing: Timing, bug: str | None) -> Iterator[str]
             yield f"  bug      {bug} ({BUGS[bug].component.value}), to no violation"
         yield _cost(found, timing)
         return
-    yield from _what_happened(found.violation, record)
+    yield from _what_happened(found.violation, found)
     yield from _which_component(found)
     yield from _which_message(found)
     yield from _certificate(found)
@@ -54,7 +56,8 @@ def _lines(found: Attribution, timing: Timing, bug: str | None) -> Iterator[str]
     yield _cost(found, timing)
 
 
-def _what_happened(violation: Violation, record: Record) -> Iterator[str]:
+def _what_happened(violation: Violation, found: Attribution) -> Iterator[str]:
+    record = found.record
     whom = f" with {violation.object}" if violation.object else ""
     yield f"VIOLATION  {violation.kind.replace('_', ' ')}{whom} at {violation.time:.1f} s"
     x, y = violation.position
@@ -63,11 +66,20 @@ def _what_happened(violation: Violation, record: Record) -> Iterator[str]:
     yield f"  what     {violation.detail}"
     if violation.contact is not None:
         yield f"  contact  {violation.contact.value.replace('_', ' ')}: {_CONTACTS[violation.contact]}"
+    yield from _whose(found.judged(violation))
     others = [one for one in record.violations if one is not violation]
     if others:
         listed = ", ".join(f"{one.kind.replace('_', ' ')} at {one.time:.1f} s" for one in others[:4])
         yield f"  also     {listed}{' ...' if len(others) > 4 else ''}"
     yield from _stops(record)
+
+
+def _whose(judged: Judged | None) -> Iterator[str]:
+    """Unless it is the ego's own."""
+    if judged is None:
+        yield "  doing    not known: it takes SUMO's own driver on the same trip, as `dvca-sumo screen` has it"
+    elif judged.fault is not AtFault.DRIVER:
+        yield f"  doing    {_WHOSE[judged.fault]}: {judged.reason}"
 
 
 def _stops(record: Record) -> Iterator[str]:

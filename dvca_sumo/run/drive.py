@@ -178,6 +178,7 @@ class Drive:
             ego=self.ego.name,
             stops=self.ego.stops,
             route=self.ego.route,
+            signed_lanes=self.judging.places.signed_lanes,
             thresholds=self._thresholds,
             sensor_range=self._stack.sensor_range,
             start=self._start,

@@ -4,10 +4,10 @@ import enum
 
 import msgspec
 
+from dvca_sumo.responsibility.disturbances import Disturbances
+from dvca_sumo.responsibility.judging import Judged, judged
 from dvca_sumo.run import Judging
-from dvca_sumo.screen.disturbances import Disturbances
 from dvca_sumo.screen.jams import Jams
-from dvca_sumo.screen.judging import Judged, judged
 from dvca_sumo.screen.measures import Measures
 from dvca_sumo.screen.queues import Held, Queues
 from dvca_sumo.truth import Moment

@@ -10,10 +10,10 @@ from dvca_sumo.engine.replay import raised, roadmap
 from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.oracles.no_progress import NoProgress
 from dvca_sumo.report.result import versions
+from dvca_sumo.responsibility.judging import AtFault, Judged
 from dvca_sumo.scenario import Scenario, ScenarioError, content_of
 from dvca_sumo.screen.anchor import anchored
 from dvca_sumo.screen.driving import Driven, Heard, driven, planned
-from dvca_sumo.screen.judging import Fault, Judged
 from dvca_sumo.screen.neighbours import Neighbours, together
 from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.trips import SLOWER, Draw, Trip, drawn
@@ -227,7 +227,7 @@ def excused(result: TripResult, native: TripResult) -> TripResult:
     else:
         return result
     violations = tuple(
-        msgspec.structs.replace(one, fault=Fault.OTHER, reason=reason)
+        msgspec.structs.replace(one, fault=AtFault.OTHER, reason=reason)
         if one.violation.kind == Destination.not_reached
         else one
         for one in result.violations

@@ -11,7 +11,7 @@ import msgspec
 
 from dvca_sumo.intervals import Rate, Share, rate_of, share_of
 from dvca_sumo.oracles import ORACLES
-from dvca_sumo.screen.judging import Fault
+from dvca_sumo.responsibility.judging import AtFault
 from dvca_sumo.screen.neighbours import Neighbours
 from dvca_sumo.screen.results import TripOutcome, TripResult
 
@@ -78,7 +78,7 @@ def summary_of(results: Sequence[TripResult], like: Sequence[TripResult], neighb
     trips = [result for result in results if result.outcome is not TripOutcome.NOT_DRIVEN]
     km = sum(trip.distance for trip in trips) / 1000.0
     faults = Counter(one.fault for trip in trips for one in trip.violations)
-    own = faults[Fault.DRIVER]
+    own = faults[AtFault.DRIVER]
     reference = {trip.ego: trip.duration for trip in like if trip.outcome is TripOutcome.ARRIVED}
     ratios = [
         trip.duration / reference[trip.ego]
@@ -98,11 +98,13 @@ def summary_of(results: Sequence[TripResult], like: Sequence[TripResult], neighb
         hours=sum(trip.duration for trip in trips) / 3600.0,
         outcomes=dict(Counter(trip.outcome.value for trip in results)),
         at_fault_collisions=sum(
-            one.violation.contact is not None and one.fault is Fault.DRIVER for trip in trips for one in trip.violations
+            one.violation.contact is not None and one.fault is AtFault.DRIVER
+            for trip in trips
+            for one in trip.violations
         ),
         at_fault_violations=own,
-        others_fault_violations=faults[Fault.OTHER],
-        simulator_violations=faults[Fault.SIMULATOR],
+        others_fault_violations=faults[AtFault.OTHER],
+        simulator_violations=faults[AtFault.SIMULATOR],
         violations_per_1000_km=rate_of(own, km / 1000.0),
         violations_per_100_trips=rate_of(own, len(trips) / 100.0),
         by_oracle={oracle.kind: _oracle(oracle.kind, trips, km) for oracle in ORACLES},
@@ -122,17 +124,17 @@ def summary_of(results: Sequence[TripResult], like: Sequence[TripResult], neighb
 def _is_ended_by_simulator(trip: TripResult) -> bool:
     if trip.outcome is not TripOutcome.CONTACT:
         return False
-    return any(one.violation.contact is not None and one.fault is Fault.SIMULATOR for one in trip.violations)
+    return any(one.violation.contact is not None and one.fault is AtFault.SIMULATOR for one in trip.violations)
 
 
 def _oracle(kind: str, trips: Sequence[TripResult], km: float) -> OracleSummary:
     found = [[one for one in trip.violations if one.oracle == kind] for trip in trips]
-    own = [sum(one.fault is Fault.DRIVER for one in some) for some in found]
+    own = [sum(one.fault is AtFault.DRIVER for one in some) for some in found]
     faults = Counter(one.fault for some in found for one in some)
     return OracleSummary(
         violations=sum(map(len, found)),
         kinds=dict(Counter(one.violation.kind for some in found for one in some)),
-        by_fault={fault.value: faults[fault] for fault in Fault},
+        by_fault={fault.value: faults[fault] for fault in AtFault},
         per_1000_km=rate_of(sum(own), km / 1000.0),
         per_100_trips=rate_of(sum(own), len(trips) / 100.0),
         trips=share_of(sum(number > 0 for number in own), len(trips)),

@@ -9,7 +9,7 @@ import msgspec
 
 from dvca_sumo.intervals import Rate, Share
 from dvca_sumo.report.result import Json, versions, violation_json
-from dvca_sumo.screen.judging import Fault, Judged
+from dvca_sumo.responsibility.judging import AtFault, Judged
 from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.screening import Screening, Setting
 from dvca_sumo.screen.summary import DriverSummary, Quartiles, summary_of
@@ -74,10 +74,8 @@ def terminal_text(screening: Screening) -> str:
     ]
     listed = [_line(trip, one, screening.setting) for trip in screening.ads for one in trip.violations]
     if listed:
-        if any(one.fault is not Fault.DRIVER for trip in screening.ads for one in trip.violations):
-            listed.append(
-                "`run` does not ask whose doing a violation is: it looks for a component in those of others, too."
-            )
+        if any(one.fault is not AtFault.DRIVER for trip in screening.ads for one in trip.violations):
+            listed.append("`run` looks for a component in those that are not the driver's, too.")
         parts.append("Violations of the ADS, and how to see each\n" + "\n".join(listed))
     drivers = (("ADS", screening.ads), ("SUMO's driver", screening.sumo_driver))
     lost = [

@@ -92,6 +92,7 @@ def drive(
         ego="ego",
         stops=(),
         route=road(length=600.0, destination=550.0),
+        signed_lanes=frozenset(),
         thresholds=Thresholds(),
         sensor_range=80.0,
         start=START,

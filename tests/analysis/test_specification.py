@@ -122,6 +122,18 @@ def test_a_plan_that_breaks_another_rule_is_not_the_one() -> None:
     assert first(drive([WALL]), breach("speed_limit", Category.TRAFFIC_RULE, START + 4.4)) is None
 
 
+@pytest.mark.parametrize("signed_lanes", [frozenset(), frozenset(["in_0"])])
+def test_no_plan_is_too_fast_for_a_lane_whose_limit_a_variable_sign_sets(signed_lanes: frozenset[str]) -> None:
+    def speeding(who: EgoTruth) -> Trajectory:
+        points = trajectory(who).points.copy()
+        points[5:, SPEED] = 30.0
+        return Trajectory(who.time, points, "cruise")
+
+    record = replace(drive(plan=speeding), signed_lanes=signed_lanes)
+    finding = first(record, breach("speed_limit", Category.TRAFFIC_RULE, START + 4.4))
+    assert (finding is None) == bool(signed_lanes)
+
+
 def test_a_plan_off_the_road_is_the_one_for_a_departure() -> None:
     def veering(who: EgoTruth) -> Trajectory:
         points = trajectory(who).points.copy()

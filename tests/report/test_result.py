@@ -11,8 +11,10 @@ from analysis.scenes import (
     CRASHED,
     FATAL,
     FAULTY,
+    HIT,
     SAFE,
     SCENARIO,
+    START,
     Answers,
     answering,
     attributed,
@@ -28,13 +30,14 @@ from dvca_sumo.analysis.attribution import Attribution, AttributionStoppedError,
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.interventions import Fault, planted_fault
 from dvca_sumo.messages import COMPONENTS, Component
+from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.record import Record
 from dvca_sumo.report.result import Timing, result_of
 from dvca_sumo.run import Task
 from dvca_sumo.scenario import Override
 from dvca_sumo.stack.sources import StackSource
 from dvca_sumo.thresholds import Thresholds
-from dvca_sumo.violations import Category
+from dvca_sumo.violations import Category, Contact, Violation
 
 PERCEPTION = Component.PERCEPTION
 TIMING = Timing(factual_wall_s=0.5, attribution_wall_s=2.0, engine="replay", jobs=2)
@@ -125,6 +128,21 @@ def test_new_keys_may_come_at_the_top_and_values_of_the_wrong_kind_may_not() -> 
         {"planted": {**result["planted"], "altered": [[1, 2, 3]]}},
     ):
         assert not VALIDATOR(SCHEMA).is_valid({**result, **wrong}), wrong
+
+
+@pytest.mark.parametrize(
+    ("violation", "fault", "reason"),
+    [
+        (HIT, "driver", ""),
+        (replace(HIT, contact=Contact.STOPPED_EGO), "other", "ran into the standing ego"),
+        (breach(Destination.not_reached, Category.MISSION, START + 4.4), None, ""),
+    ],
+)
+def test_whose_doing_a_violation_is_is_told(violation: Violation, fault: str | None, reason: str) -> None:
+    record = faulty_drive(violation)
+    result = told(attributed(record, answering(record, {PERCEPTION: FATAL})))
+    for one in (result["violation"], *result["violations"]):
+        assert (one["fault"], one["reason"]) == (fault, reason)
 
 
 def test_nothing_to_explain() -> None:

@@ -26,10 +26,11 @@ from msgspec.structs import replace
 from dvca_sumo.analysis.attribution import Attribution
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.messages import Component
+from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.report.result import Timing
 from dvca_sumo.report.terminal import verdict_text
 from dvca_sumo.run import Task
-from dvca_sumo.violations import Category, Contact, Ending
+from dvca_sumo.violations import Category, Contact, Ending, Violation
 
 PERCEPTION, PREDICTION = Component.PERCEPTION, Component.PREDICTION
 TIMING = Timing(factual_wall_s=0.5, attribution_wall_s=2.0, engine="fork", jobs=2)
@@ -66,6 +67,19 @@ def test_a_clean_run_says_so_and_how_it_ended() -> None:
     assert "arrived after 6.0 s" in said
     assert "1 run, 0.5 s" in said
     assert "on its way" in text(attributed(drive(ending=Ending.TIME_OVER), lambda _: SAFE))
+
+
+@pytest.mark.parametrize(
+    ("violation", "says"),
+    [
+        (replace(HIT, contact=Contact.STOPPED_EGO), "the other one's: ran into the standing ego"),
+        (breach(Destination.not_reached, Category.MISSION, START + 4.4), "not known"),
+    ],
+)
+def test_whose_doing_it_is_stands_there_unless_it_is_the_egos(violation: Violation, says: str) -> None:
+    record = faulty_drive(violation)
+    assert says in line(text(attributed(record, answering(record, {PERCEPTION: FATAL}))), "doing")
+    assert "doing" not in text(explained())
 
 
 def test_a_run_that_could_not_be_judged_is_not_called_clean() -> None:

@@ -10,11 +10,11 @@ from screen_scenes import HEAR, TRAFFIC, draw, drive, traffic
 from small_scenarios import driven as driven_alone
 from small_scenarios import in_child, scenario_file
 
+from dvca_sumo.responsibility.judging import AtFault
 from dvca_sumo.scenario import AUTO, Scenario, load_scenario
 from dvca_sumo.screen import anchor
 from dvca_sumo.screen.anchor import anchored
 from dvca_sumo.screen.driving import driven
-from dvca_sumo.screen.judging import Fault
 from dvca_sumo.screen.neighbours import Neighbours
 from dvca_sumo.screen.results import TripOutcome
 from dvca_sumo.screen.summary import summary_of
@@ -97,7 +97,9 @@ def test_sumos_drivers_are_judged_by_the_same_oracles(tmp_path: Path, street: Pa
     scenario = traffic(tmp_path, street, fast)
     results = {one.ego: one for one in in_child(partial(anchored, scenario, draw(scenario, 5).trips, HEAR)).results}
     assert {result.outcome for result in results.values()} == {TripOutcome.ARRIVED}
-    assert {(one.violation.kind, one.fault) for one in results["second"].violations} == {("speed_limit", Fault.DRIVER)}
+    assert {(one.violation.kind, one.fault) for one in results["second"].violations} == {
+        ("speed_limit", AtFault.DRIVER)
+    }
     assert [result.ego for result in results.values() if result.violations] == ["second"]
     assert results["first"].distance > 450.0
 
@@ -164,13 +166,13 @@ def test_a_trip_ends_on_the_same_edge_whoever_drives(tmp_path: Path, street: Pat
 @pytest.mark.parametrize(
     ("other", "stop", "fault"),
     [
-        ('type="stuck"', "", Fault.OTHER),
-        ("", '<stop lane="we_0" endPos="200" duration="1000"/>', Fault.DRIVER),
+        ('type="stuck"', "", AtFault.OTHER),
+        ("", '<stop lane="we_0" endPos="200" duration="1000"/>', AtFault.DRIVER),
     ],
     ids=["in a jam", "behind who stops there"],
 )
 def test_an_ego_held_up_in_a_jam_is_not_at_fault(
-    tmp_path: Path, lane: Path, other: str, stop: str, fault: Fault
+    tmp_path: Path, lane: Path, other: str, stop: str, fault: AtFault
 ) -> None:
     """SUMO's vehicles stand in jams that only a teleport ends; one that means to stand there is to be passed."""
     routes = (
@@ -182,10 +184,10 @@ def test_an_ego_held_up_in_a_jam_is_not_at_fault(
     (result,) = found.results
     assert result.outcome is TripOutcome.TIME_OVER
     assert [(one.violation.kind, one.fault) for one in result.violations] == [("destination_not_reached", fault)]
-    assert ("other" in result.violations[0].reason) == (fault is Fault.OTHER)
-    assert found.neighbours.stood == (fault is Fault.OTHER)
+    assert ("other" in result.violations[0].reason) == (fault is AtFault.OTHER)
+    assert found.neighbours.stood == (fault is AtFault.OTHER)
     assert found.neighbours.hours == pytest.approx(result.duration / 3600.0, abs=0.005)
-    assert (result.held > 60.0) == (fault is Fault.OTHER)
+    assert (result.held > 60.0) == (fault is AtFault.OTHER)
 
 
 @pytest.mark.parametrize(("speed", "held"), [("1", 250.0), ("12", 0.0)], ids=["behind a slow one", "in free traffic"])

@@ -10,9 +10,9 @@ import pytest
 from command_line import assert_one_error, typed
 from screen_scenes import traffic
 
+from dvca_sumo.responsibility.judging import AtFault, Judged
 from dvca_sumo.scenario import AUTO, Scenario, load_scenario
 from dvca_sumo.screen.driving import Driven
-from dvca_sumo.screen.judging import Fault, Judged
 from dvca_sumo.screen.neighbours import Neighbours
 from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.screening import Progress, Screening, Setting, Stores, excused, screened
@@ -142,7 +142,8 @@ def test_trips_that_the_simulator_ended_or_the_scenario_cut_off_are_counted_apar
     contact = Violation("collision", Category.SAFETY, 5.0, "x", (0.0, 0.0), "ab_0", 0.0, 0.0, "", Contact.ACTIVE_FRONT)
     trips = [TripResult("arrived", TripOutcome.ARRIVED), TripResult("cut", TripOutcome.CUT)]
     trips += [
-        TripResult(fault, TripOutcome.CONTACT, violations=(Judged("collision", contact, fault, ""),)) for fault in Fault
+        TripResult(fault, TripOutcome.CONTACT, violations=(Judged("collision", contact, fault, ""),))
+        for fault in AtFault
     ]
     found = summary_of(trips, [], Neighbours(0.0, 0, 0, 0))
     assert (found.trips, found.ended_by_simulator, found.cut) == (5, 1, 1)
@@ -172,10 +173,10 @@ def test_what_an_oracle_could_not_tell_is_a_gap_and_the_text_says_on_how_many_tr
     assert "could not tell" not in terminal_text(_untold(reckless, ()))
 
 
-def test_where_a_violation_is_not_the_drivers_the_text_says_that_run_does_not_ask(reckless: Screening) -> None:
-    said = "`run` does not ask whose doing a violation is"
+def test_where_a_violation_is_not_the_drivers_the_text_says_that_run_asks_nevertheless(reckless: Screening) -> None:
+    said = "`run` looks for a component in those that are not the driver's, too."
     first, *others = reckless.ads
-    excused = tuple(msgspec.structs.replace(one, fault=Fault.OTHER) for one in first.violations)
+    excused = tuple(msgspec.structs.replace(one, fault=AtFault.OTHER) for one in first.violations)
     screening = msgspec.structs.replace(reckless, ads=(msgspec.structs.replace(first, violations=excused), *others))
     assert said in terminal_text(screening)
     assert said not in terminal_text(reckless)
@@ -267,9 +268,9 @@ def test_a_destination_is_excused_only_where_sumos_driver_was_held_up_as_long(re
         "ego",
         TripOutcome.TIME_OVER,
         duration=100.0,
-        violations=(Judged("destination", destination, Fault.DRIVER, ""),),
+        violations=(Judged("destination", destination, AtFault.DRIVER, ""),),
     )
-    for taken, fault in ((99.0, Fault.DRIVER), (101.0, Fault.OTHER)):
+    for taken, fault in ((99.0, AtFault.DRIVER), (101.0, AtFault.OTHER)):
         native = TripResult("ego", TripOutcome.ARRIVED, duration=taken)
         assert [one.fault for one in excused(late, native).violations] == [fault]
     assert all(result == excused(result, result) for result in reckless.ads)
@@ -278,22 +279,22 @@ def test_a_destination_is_excused_only_where_sumos_driver_was_held_up_as_long(re
 @pytest.mark.parametrize(
     ("held", "distance", "kinds", "fault"),
     [
-        (140.0, 900.0, [], Fault.OTHER),
-        (60.0, 900.0, [], Fault.DRIVER),
-        (140.0, 300.0, [], Fault.DRIVER),
-        (140.0, 900.0, ["no_progress"], Fault.DRIVER),
+        (140.0, 900.0, [], AtFault.OTHER),
+        (60.0, 900.0, [], AtFault.DRIVER),
+        (140.0, 300.0, [], AtFault.DRIVER),
+        (140.0, 900.0, ["no_progress"], AtFault.DRIVER),
     ],
     ids=["in time but for queues", "too slow besides", "too much left to drive", "stood for no reason"],
 )
 def test_a_destination_is_excused_where_the_ego_was_held_up_in_queues_and_is_quick_besides(
-    held: float, distance: float, kinds: list[str], fault: Fault
+    held: float, distance: float, kinds: list[str], fault: AtFault
 ) -> None:
     """SUMO's driver took 120 s for 1 000 m, 20 s of them in queues; an ego may take 1.5 times its 100 s besides."""
     violations = [
         Judged(
             "destination" if kind.startswith("destination") else kind,
             Violation(kind, Category.MISSION, 99.0, None, (0.0, 0.0), None, 40.0, 3.0, ""),
-            Fault.DRIVER,
+            AtFault.DRIVER,
             "",
         )
         for kind in [*kinds, "destination_not_reached"]

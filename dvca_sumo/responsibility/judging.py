@@ -25,8 +25,8 @@ from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.boxes import box_of, corners
 from dvca_sumo.messages import Floats
 from dvca_sumo.oracles.destination import Destination
+from dvca_sumo.responsibility.disturbances import Disturbance, Disturbances
 from dvca_sumo.roadmap import Lane, RoadMap
-from dvca_sumo.screen.disturbances import Disturbance, Disturbances
 from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Contact, Judgement, Violation
 
@@ -37,7 +37,7 @@ _AWAY = 0.05  # [rad] of heading from the middle of a lane, at least
 _BEFORE = 5.0  # [s] before a contact what is about the same object belongs to it
 
 
-class Fault(enum.StrEnum):
+class AtFault(enum.StrEnum):
     """Whose doing a violation is."""
 
     DRIVER = "driver"
@@ -50,7 +50,7 @@ class Judged(msgspec.Struct, frozen=True):
 
     oracle: str
     violation: Violation
-    fault: Fault
+    fault: AtFault
     reason: str  # why it is not the driver's; empty if it is
     is_alone: bool | None = None  # whether it also occurs with no other ego in the simulation; None: not known
 
@@ -77,13 +77,13 @@ def judged(
         if violation.object is not None and disturbance is not None and disturbance.lasts(violation.time):
             begun[violation.object] = disturbance
             reason = f"{disturbance.object} {disturbance.how} at {disturbance.time:.1f} s"
-            found.append(Judged(oracle, violation, Fault.SIMULATOR, reason))
+            found.append(Judged(oracle, violation, AtFault.SIMULATOR, reason))
         elif excuse and contact is not None and _belongs(violation, contact):
-            found.append(Judged(oracle, violation, Fault.OTHER, excuse))
+            found.append(Judged(oracle, violation, AtFault.OTHER, excuse))
         elif oracle == Destination.kind and jam is not None:
-            found.append(Judged(oracle, violation, Fault.OTHER, f"held up in a jam behind {jam}"))
+            found.append(Judged(oracle, violation, AtFault.OTHER, f"held up in a jam behind {jam}"))
         else:
-            found.append(Judged(oracle, violation, Fault.DRIVER, ""))
+            found.append(Judged(oracle, violation, AtFault.DRIVER, ""))
     return tuple(found)
 
 
