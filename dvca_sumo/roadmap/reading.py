@@ -38,7 +38,7 @@ def read_net(path: Path, vehicle_class: str) -> NetContents:
     """Read `path` (.net.xml, also gzipped) as a driver of `vehicle_class` sees it.
 
     Raises RoadMapError when the file is missing or no net, the class is unknown to SUMO, or an edge has a "dvca."
-    parameter that there is not, or with a value that is none.
+    parameter that there is not, or with a value that is none, or a lane any.
     """
     if vehicle_class not in SUMO_VEHICLE_CLASSES:
         raise RoadMapError(f"unknown vehicle class {vehicle_class!r}; SUMO knows passenger, bus, truck, taxi, ...")
@@ -81,6 +81,10 @@ def _refuse_wrong_parameters(edge: Any) -> None:
             raise RoadMapError(f"no parameter {key} of the edge {edge.getID()!r} (allowed: {_LIMIT_KEY})")
         if key == _LIMIT_KEY and text != _MISSING:
             raise RoadMapError(f"parameter {key} of the edge {edge.getID()!r} is {text!r} (allowed: {_MISSING})")
+    for lane in edge.getLanes():
+        for key in lane.getParams():
+            if key.startswith(_PREFIX):
+                raise RoadMapError(f"parameter {key} of the lane {lane.getID()!r} (allowed: {_LIMIT_KEY}, of an edge)")
 
 
 def _lane_ids(edge: Any) -> Iterator[str]:

@@ -10,6 +10,7 @@ from dvca_sumo.scenario.errors import ScenarioError
 
 MARK = "ego"  # name of the parameter that marks the ego
 _PREFIX = "dvca."
+_VEHICLES, _ALLOWED = ("vehicle", "trip", "flow"), "of a vehicle, a trip or a flow"
 _TRUE, _FALSE = ("true", "1", "yes", "on", "t", "x"), ("false", "0", "no", "off", "f", "-")  # as SUMO reads them
 
 
@@ -38,7 +39,7 @@ def parameters_within(text: str, path: Path) -> tuple[Parameter, ...]:
     """Those in the text of one file, in their order.
 
     Raises:
-        ScenarioError: There are some, and the text is not well-formed.
+        ScenarioError: There are some, and the text is not well-formed, or they are not a vehicle's.
     """
     return _parsed(text, path) if _PREFIX in text else ()
 
@@ -46,16 +47,20 @@ def parameters_within(text: str, path: Path) -> tuple[Parameter, ...]:
 @cache  # a run's process finds here what its parent has parsed
 def _parsed(text: str, path: Path) -> tuple[Parameter, ...]:
     found: list[Parameter] = []
-    current: ET.Element | None = None
+    around: list[ET.Element] = []  # the elements that are open
     try:
         for event, element in ET.iterparse(io.StringIO(text), ("start", "end")):  # noqa: S314 - the user's own file
-            if element.tag in ("vehicle", "trip", "flow"):
-                current = element if event == "start" else None
-            elif event == "end" and current is not None and element.tag == "param":
-                key, name = element.get("key", ""), current.get("id", "")
-                if key.startswith(_PREFIX):
-                    vehicle = f"{name}.0" if current.tag == "flow" else name
-                    found.append(Parameter(vehicle, key.removeprefix(_PREFIX), element.get("value", "")))
+            if event == "start":
+                around.append(element)
+                continue
+            around.pop()
+            key = element.get("key", "") if element.tag == "param" else ""
+            if key.startswith(_PREFIX):
+                owner, name = around[-1].tag, around[-1].get("id", "")
+                if owner not in _VEHICLES:
+                    raise ScenarioError(f"parameter {key} of {owner} {name!r} in {path} (allowed: {_ALLOWED})")
+                vehicle = f"{name}.0" if owner == "flow" else name
+                found.append(Parameter(vehicle, key.removeprefix(_PREFIX), element.get("value", "")))
     except ET.ParseError as error:
         raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
     return tuple(found)

@@ -37,6 +37,12 @@ def _add_to_edge(folder: Path, text: str) -> None:
     (folder / "net.net.xml").write_text(head + edge + tail.replace("</edge>", f"{text}</edge>", 1), encoding="utf-8")
 
 
+def _add_to_lane(folder: Path, text: str) -> None:
+    net = (folder / "net.net.xml").read_text(encoding="utf-8")
+    head, lane, tail = net.partition('<lane id="bc_0"')
+    (folder / "net.net.xml").write_text(head + lane + tail.replace("/>", f">{text}</lane>", 1), encoding="utf-8")
+
+
 class Broken(NamedTuple):
     """A scenario with one defect, and what must be said of it."""
 
@@ -120,6 +126,19 @@ BROKEN = {
     "mark that is neither true nor false": Broken(
         ("parameter dvca.ego of 'ego' is 'maybe'", "allowed: true, 1, yes, on"),
         routes=EGO.replace("/>", '><param key="dvca.ego" value="maybe"/></trip>'),
+    ),
+    "parameter of a type of vehicles": Broken(
+        ("parameter dvca.ttc of vType 'fast' in ", "routes.rou.xml (allowed: of a vehicle, a trip or a flow)"),
+        routes='<vType id="fast"><param key="dvca.ttc" value="1"/></vType>' + EGO,
+    ),
+    "parameter of a route within a vehicle": Broken(
+        ("parameter dvca.ttc of route '' in ",),
+        routes=EGO
+        + '<vehicle id="car" depart="9"><route edges="bc"><param key="dvca.ttc" value="1"/></route></vehicle>',
+    ),
+    "parameter of a lane": Broken(
+        ("parameter dvca.map.speed_limit of the lane 'bc_0' (allowed: dvca.map.speed_limit, of an edge)",),
+        lambda folder: _add_to_lane(folder, '<param key="dvca.map.speed_limit" value="missing"/>'),
     ),
     "parameter of an edge misspelt": Broken(
         ("no parameter dvca.map.speedlimit of the edge 'bc' (allowed: dvca.map.speed_limit)",),

@@ -51,7 +51,7 @@ def test_a_mark_that_is_neither_true_nor_false_is_refused(tmp_path: Path, net: P
 
 def test_parameters_are_those_of_vehicles_whose_names_are_this_program_s(tmp_path: Path, net: Path) -> None:
     ours, other = '<param key="dvca.ttc" value="0.7"/>', '<param key="other" value="1"/>'
-    routes = f'<trip id="a">{other}{ours}</trip><flow id="f">{ours}</flow><person id="p">{ours}</person>'
+    routes = f'<trip id="a">{other}{ours}</trip><flow id="f">{ours}</flow>'
     definitions = Definitions(read_configuration(scenario_file(tmp_path, net, routes)))
     assert definitions.parameters == [("a", "ttc", "0.7"), ("f.0", "ttc", "0.7")]
 
@@ -93,8 +93,8 @@ def test_two_marked_vehicles_are_one_too_many(tmp_path: Path, net: Path) -> None
         chosen(tmp_path, net, f'<vehicle id="a">{MARK}</vehicle><vehicle id="b">{MARK}</vehicle>')
 
 
-def test_a_marked_person_does_not_make_the_vehicle_before_it_the_ego(tmp_path: Path, net: Path) -> None:
-    with pytest.raises(ScenarioError, match="names no ego"):
+def test_a_marked_person_is_refused_and_not_taken_for_the_vehicle_before_it(tmp_path: Path, net: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"parameter dvca\.ego of person 'b' in .*routes.rou.xml"):
         chosen(tmp_path, net, f'<vehicle id="a"/><person id="b">{MARK}</person>')
 
 
