@@ -149,9 +149,9 @@ class World:
         """
         for ego in self._egos:
             lane = ego.lane()
-            self._session.stretch(ego.name, ego.occupied())
-            self._session.place(ego.name, ego.truth, ego.shape.front, lane, ego.indicated(lane))
-            self._session.straddle(ego.name, ego.truth, ego.shape, ego.straddled(lane))
+            self._session.egos.stretch(ego.name, ego.occupied())
+            self._session.egos.place(ego.name, ego.truth, ego.shape.front, lane, ego.indicated(lane))
+            self._session.egos.straddle(ego.name, ego.truth, ego.shape, ego.straddled(lane))
         self._session.step()
         lost = tuple(ego for ego in self._egos if not self._session.has(ego.name))
         for ego in lost:

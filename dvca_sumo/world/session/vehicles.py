@@ -1,0 +1,24 @@
+"""Which vehicles there are in the simulation."""
+
+import libsumo
+
+SHADOW = "dvca.shadow"  # vehicle type of what stands for an ego on a second lane
+
+
+def has(vehicle: str) -> bool:
+    """Whether the vehicle is in the simulation (inserted and not removed)."""
+    try:
+        libsumo.vehicle.getRoadID(vehicle)
+    except libsumo.TraCIException:
+        return False
+    return True
+
+
+def shadow_of(ego: str, lane: str) -> str:
+    """The name of an ego's shadow on a lane."""
+    return f"{SHADOW}.{lane}.{ego}"
+
+
+def is_shadow(name: str) -> bool:
+    """Whether it is the name of one."""
+    return name.startswith(f"{SHADOW}.")
