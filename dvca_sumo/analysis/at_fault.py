@@ -10,9 +10,10 @@ from dvca_sumo.responsibility.judging import Judged, judged
 from dvca_sumo.roadmap import RoadMap
 
 
-def places_of(record: Record, roadmap: RoadMap) -> Places:
-    """Fresh places of the recorded drive."""
-    return Places(record.route, roadmap, record.signed_lanes)
+def places_of(record: Record, roadmap: RoadMap, tick: int | None = None) -> Places:
+    """Fresh places of the recorded drive, or of what goes on from a tick of it."""
+    begin = None if tick is None else record.stations[tick] + record.moments[0].shape.front
+    return Places(record.route, roadmap, record.signed_lanes, begin)
 
 
 def at_fault(record: Record, roadmap: RoadMap) -> tuple[Judged, ...]:

@@ -231,7 +231,8 @@ def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution, *,
     if outcome is Outcome.UNRESOLVED:
         return f"the repeated run could not be told: {probe.reason}"
     digests = found.record.digests
-    is_same = probe.steps > 0 and digests[probe.steps - 1 : probe.steps] == [probe.last_step]
+    is_at_once = probe.steps == 0 and outcome is Outcome.VIOLATES  # at the departure: nothing was driven before
+    is_same = is_at_once or (probe.steps > 0 and digests[probe.steps - 1 : probe.steps] == [probe.last_step])
     if is_same and outcome is Outcome.SAFE:
         return f"the repeated run is the same, but shows no violation until {found.until:.1f} s"
     if factual.jitter is not None or (is_same and not from_start):
@@ -245,8 +246,8 @@ def _differing(engine: Engine, factual: Task, record: Record, *, is_known: bool)
         again = engine.record(factual).digests
     except (ScenarioError, StackError, RunFailedError) as error:
         return f"{'the repeated run differs, and ' if is_known else ''}one more run failed: {error}"
-    if not is_known and again == record.digests:
-        return ""
+    if again == record.digests:
+        return "the repeated run differs, one more does not" if is_known else ""
     pairs = enumerate(zip(record.digests, again, strict=False))
     same = next((step for step, pair in pairs if len({*pair}) > 1), len(again))
     return f"the repeated run differs: first at {record.start + 0.1 * same:.1f} s"

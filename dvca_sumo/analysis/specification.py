@@ -118,7 +118,7 @@ def _breach(
     record: Record, roadmap: RoadMap, thresholds: Thresholds, trajectory: Trajectory, tick: int, violation: Violation
 ) -> str:
     moments = _driven(record, trajectory, tick)
-    for judgement in judge(moments, judges(places_of(record, roadmap), thresholds), Ending.CUT):
+    for judgement in judge(moments, judges(places_of(record, roadmap, tick), thresholds), Ending.CUT):
         for found in judgement.violations:
             if is_same_family(found.kind, violation) and found.object == violation.object:
                 return f"driven as planned it leads to {found.kind} in {found.time - moments[0].time:.1f} s"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from dvca_sumo.geometry.boxes import distances
-from dvca_sumo.messages import Floats
+from dvca_sumo.messages import Floats, ObjectClass
 from dvca_sumo.oracles.findings import Findings
 from dvca_sumo.oracles.place import Places
 from dvca_sumo.thresholds import Thresholds
@@ -102,16 +102,25 @@ class Collision:
 
 
 def _contact_of(moment: Moment, row: int, *, stands: bool) -> Contact:
-    if stands:
+    """Who touched whom; what never moves runs into nobody, and who does so from behind touches the rear alone."""
+    ego, shape, box = moment.ego, moment.shape, moment.objects.boxes[row]
+    moves = moment.objects.classes[row] != ObjectClass.STATIC
+    if stands and moves:
         return Contact.STOPPED_EGO
-    ego, shape = moment.ego, moment.shape
-    box = moment.objects.boxes[row]
+    is_at_front = _touches(moment, shape.front, box)
     angle = math.atan2(box[1] - ego.y, box[0] - ego.x) - ego.heading
-    if abs(math.remainder(angle, math.tau)) > _BEHIND and ego.speed >= 0.0:
+    is_behind = abs(math.remainder(angle, math.tau)) > _BEHIND and ego.speed >= 0.0
+    if is_behind and moves and not is_at_front and _touches(moment, -shape.rear_overhang, box):
         return Contact.HIT_FROM_BEHIND
-    x, y = ego.x + shape.front * math.cos(ego.heading), ego.y + shape.front * math.sin(ego.heading)
-    bumper = np.array([x, y, ego.heading, 0.0, shape.width])
-    return Contact.ACTIVE_FRONT if distances(bumper, box[None])[0] == 0.0 else Contact.ACTIVE_SIDE
+    return Contact.ACTIVE_FRONT if is_at_front else Contact.ACTIVE_SIDE
+
+
+def _touches(moment: Moment, ahead: float, box: Floats) -> bool:
+    """Whether a box touches the bumper of the ego that is so far `ahead` of its rear axle [m]."""
+    ego = moment.ego
+    x, y = ego.x + ahead * math.cos(ego.heading), ego.y + ahead * math.sin(ego.heading)
+    bumper = np.array([x, y, ego.heading, 0.0, moment.shape.width])
+    return bool(distances(bumper, box[None])[0] == 0.0)
 
 
 def _is_behind(moment: Moment, box: Floats, row: int) -> bool:

@@ -43,15 +43,24 @@ class Places:
     Remembers the last place only. Oracles that share an instance cost one projection a moment.
     """
 
-    def __init__(self, route: Route, roadmap: RoadMap, signed_lanes: frozenset[str] = frozenset()) -> None:
-        """Places along `route`; the limit of `signed_lanes` may be another than the route's, at any time."""
+    def __init__(
+        self,
+        route: Route,
+        roadmap: RoadMap,
+        signed_lanes: frozenset[str] = frozenset(),
+        begin: float | None = None,
+    ) -> None:
+        """Places along `route`, from its start on, or from the station `begin` of the front bumper [m].
+
+        The limit of `signed_lanes` may be another than the route's, at any time.
+        """
         self.route = route
         self.roadmap = roadmap
         self.signed_lanes = signed_lanes
         self._last: Place | None = None
         self._stations = route.line.stations.tolist()
         self._neighbours: tuple[ObjectsTruth, Neighbours] | None = None
-        self._anchor = route.start  # [m] last station known to be right ...
+        self._anchor = route.start if begin is None else begin  # [m] last station known to be right ...
         self._anchor_time: float | None = None  # [s] ... and when
 
     def at(self, moment: Moment) -> Place:
@@ -139,5 +148,18 @@ class Places:
         stations, offsets = line.project(points, between=(low, high))
         if self._anchor_time is None and not low < stations[0] < high:
             # The run did not begin where the route says; from then on the window follows.
-            return line.project(points)
+            stations, offsets = line.project(points)
+        return self._carried_on(points, stations, offsets)
+
+    def _carried_on(self, points: Floats, stations: Floats, offsets: Floats) -> tuple[Floats, Floats]:
+        """The same, those past the end of the line, which a road may have with it, along a straight continuation."""
+        line = self.route.line
+        rows = (stations >= line.length).nonzero()[0]
+        if rows.size:
+            heading = float(line.headings[-1])
+            axes = np.array([[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]])
+            beyond, aside = ((points[rows] - line.points[-1]) @ axes).T
+            is_past = (beyond > 0.0) & (beyond <= OFF_ROUTE)
+            stations[rows[is_past]] += beyond[is_past]
+            offsets[rows[is_past]] = aside[is_past]
         return stations, offsets

@@ -2,16 +2,17 @@
 
 1. The simulator's: see `disturbances`.
 2. The other one's: it ran into the standing ego; it ran into the rear of the ego while that was in its lane, or while
-   the ego was on its way out of the other one's lane; it touched the flank of an ego that was in its lane and not on a
-   junction. Then time to collision and distance to that same object just before are its doing, too. And a destination
-   is not reached for the others' sake when SUMO's own driver on the same trip had not arrived after the same time
-   either, when it ends in a jam (see `jams`), or when the ego, the time in queues apart that no ego heads (see
-   `queues`), was not too slow compared with that driver.
+   the ego was on its way out of the other one's lane; it moved, and touched the flank of an ego that was in its lane
+   and not on a junction. Then time to collision and distance to that same object just before are its doing, too. And
+   a destination is not reached for the others' sake when SUMO's own driver on the same trip had not arrived after the
+   same time either, when it ends in a jam (see `jams`), or when the ego, the time in queues apart that no ego heads
+   (see `queues`), was not too slow compared with that driver.
 3. Everything else is the driver's: the ego's own. Traffic rules are always the driver's.
 
-The ego, or its rear, is in its lane when no corner is more than 0.3 m beyond the edges of the lane under its middle.
-In sharp turns the front sweeps out further. The ego is on its way out of a lane, off the junctions, when its rear is
-partly on it and its heading leads away from the middle. SUMO's drivers follow who is on their lane with its middle.
+The ego, or its rear, is in its lane when no corner is more than 0.3 m beyond the edges of the lane under its middle,
+and that leads the way that it drives. In sharp turns the front sweeps out further. The ego is on its way out of a lane,
+off the junctions, when its rear is partly on it and its heading leads away from the middle. SUMO's drivers follow who
+is on their lane with its middle.
 """
 
 import enum
@@ -34,6 +35,7 @@ _TOLERANCE = 0.3  # [m] as of the oracle of the lane
 _NEAR = 3.0  # [m] from its middle a lane is under the ego
 _REAR = slice(1, 3)  # of the corners of a box
 _AWAY = 0.05  # [rad] of heading from the middle of a lane, at least
+_STANDING = 0.1  # [m/s]
 _BEFORE = 5.0  # [s] before a contact what is about the same object belongs to it
 
 
@@ -100,21 +102,25 @@ def _excuse(contact: Violation, moment: Moment, roadmap: RoadMap) -> str:
     ego = moment.ego
     box = box_of(ego.x, ego.y, ego.heading, moment.shape)
     spots = corners(box[None])[0]
+    row = moment.objects.ids.index(contact.object or "")
     if contact.contact is Contact.HIT_FROM_BEHIND:
-        other = moment.objects.boxes[moment.objects.ids.index(contact.object or "")]
+        other = moment.objects.boxes[row]
         is_clear = _lane_kept(spots[_REAR], box, roadmap) is not None or _leaves(spots[_REAR], box, other, roadmap)
         return "ran into the ego from behind" if is_clear else ""
+    if math.hypot(*moment.objects.velocities[row].tolist()) < _STANDING:
+        return ""
     lane = _lane_kept(spots, box, roadmap)
     return "touched the ego in its lane" if lane is not None and not lane.is_internal else ""
 
 
 def _lane_kept(spots: Floats, box: Floats, roadmap: RoadMap) -> Lane | None:
-    """The lane under the middle of the ego's `box` (5,) if all `spots` (n, 2) are in it."""
+    """The lane under the middle of the ego's `box` (5,) that leads its way, if all `spots` (n, 2) are in it."""
     near = roadmap.lanes_near(box[None, :2], _NEAR)[0]
     for name in near:
         lane = roadmap.lanes[name]
-        _, offsets = lane.line.project(spots)
-        if float(np.abs(offsets).max()) <= 0.5 * lane.width + _TOLERANCE:
+        stations, offsets = lane.line.project(spots)
+        is_along = abs(wrapped(box[2] - float(lane.line.headings_at(stations[:1])[0]))) < 0.5 * math.pi
+        if is_along and float(np.abs(offsets).max()) <= 0.5 * lane.width + _TOLERANCE:
             return lane
     return None
 

@@ -33,7 +33,7 @@ from dvca_sumo.violations import Ending, Judgement, Violation
 from dvca_sumo.world import ControlCommandError, Ego
 
 TICKS_PER_STEP = 10
-ARRIVED_WITHIN = 3.0  # [m]
+ARRIVED_WITHIN = 3.0  # [m] or within the tolerance of its destination, where that is less
 _LOST_BEYOND = 60.0  # [m] past its destination an ego will not come back
 _PHASE_STREAM = 101
 _CHANNELS = {component: component.value for component in COMPONENTS}  # an enum's value is slow to ask for
@@ -81,6 +81,7 @@ class Drive:
         self.judging = judging
         self._is_whole = is_whole
         self._thresholds = judging.thresholds
+        self._arrived_within = min(ARRIVED_WITHIN, judging.thresholds.destination_tolerance)  # [m]
         self._oracles = judging.oracles
         self._stack = stack
         self._task = task
@@ -292,7 +293,7 @@ class Drive:
 
     def _ended(self, moment: Moment) -> Ending | None:
         rule, beyond = self._task.stop, self.ego.station() + self.ego.shape.front - self.ego.route.destination
-        if abs(beyond) <= ARRIVED_WITHIN and moment.ego.speed == 0.0:
+        if abs(beyond) <= self._arrived_within and moment.ego.speed == 0.0:
             return Ending.ARRIVED
         if moment.time >= self._latest - TICK or beyond > _LOST_BEYOND or self._is_stuck:
             return Ending.TIME_OVER

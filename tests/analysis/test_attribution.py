@@ -232,6 +232,20 @@ def test_a_run_that_does_not_repeat_is_not_reproducible_with_the_first_differenc
     assert found.components is None
 
 
+def test_a_violation_at_the_departure_is_reproduced_though_nothing_was_driven_before() -> None:
+    at_once = collision(START)
+    found = attributed(faulty_drive(at_once), lambda _: glimpse(at_once))
+    assert found.is_reproducible
+    assert found.verdict is Verdict.PLANNING
+
+
+def test_where_one_more_run_is_the_same_no_difference_is_made_up() -> None:
+    record = faulty_drive()
+    found = attributed(record, lambda _: glimpse(HIT, steps=99), again=[record])
+    assert found.verdict is Verdict.NOT_REPRODUCIBLE
+    assert "first at" not in found.reason
+
+
 def test_a_repeated_run_that_ends_earlier_differs_from_there_on() -> None:
     record = faulty_drive()
     shorter = replace(record, digests=record.digests[:20])

@@ -1,14 +1,17 @@
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 from interventions.scenes import Thing, estimate, trajectory, walker
 from msgspec.structs import replace
+from small_scenarios import driven, scenario_file
 
 from analysis.scenes import BARE_MAP, START, breach, collision, drive, saying
 from dvca_sumo.analysis.specification import FORESIGHT, PlanningFinding, first_unusable_plan, first_violating_plan
 from dvca_sumo.messages import SPEED, Component, MessageId, Trajectory, X, Y
 from dvca_sumo.record import Record
+from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import EgoTruth
 from dvca_sumo.violations import Category, Violation
@@ -225,3 +228,19 @@ def test_a_plan_that_begins_beside_the_ego_cannot_be_followed_and_one_into_a_wal
     assert beside_it is not None
     assert "1.5 m to the left" in beside_it.reason
     assert first_unusable_plan(drive([WALL]), START, START + 4.4) is None
+
+
+def test_on_a_route_that_comes_by_again_a_plan_is_judged_where_it_was_made(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    """Round the block, and out of it: the second time along the same road, the way goes straight on."""
+    nodes = (("w", -60, 0), ("a", 0, 0), ("b", 70, 0), ("c", 70, 70), ("d", 0, 70), ("x", 230, 0))
+    edges = "".join(
+        f'<edge id="{way}" from="{way[0]}" to="{way[1]}" speed="11"/>' for way in ["wa", "ab", "bc", "cd", "da", "bx"]
+    )
+    net = plain_file("".join(f'<node id="{name}" x="{x}" y="{y}"/>' for name, x, y in nodes), edges)
+    trip = '<vehicle id="ego" depart="0" departPos="20" departSpeed="8" arrivalPos="140"><route edges="{}"/></vehicle>'
+    record = driven(scenario_file(tmp_path, net, trip.format("wa ab bc cd da ab bx")))
+    assert record.violations == []
+    departed = breach("lane_departure", Category.TRAFFIC_RULE, record.moments[-1].time)
+    assert first_violating_plan(record, RoadMap.load(net), record.thresholds, departed) is None

@@ -1,8 +1,11 @@
 import math
 
+import msgspec
+import numpy as np
 import pytest
 from oracle_scenes import Row, car, drive, judged, moment
 
+from dvca_sumo.messages import ObjectClass
 from dvca_sumo.oracles.collision import Collision
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.violations import Answer, Contact, Ending
@@ -113,6 +116,36 @@ def test_a_contact_at_the_flank_is_a_side_contact() -> None:
     ]
     (violation,) = judged(Collision, moments).violations
     assert violation.contact is Contact.ACTIVE_SIDE
+
+
+@pytest.mark.parametrize(
+    ("body", "kind"),
+    [
+        (("polygon:kerb", (45.0, -1.9, 0.0, 50.0, 0.2), (0.0, 0.0)), ObjectClass.STATIC),
+        (("tram", (33.0, -2.9, 0.0, 40.0, 2.4), (9.5, 0.0)), ObjectClass.VEHICLE),
+    ],
+)
+def test_what_is_long_and_beside_the_ego_that_swerves_is_not_behind_it(body: Row, kind: ObjectClass) -> None:
+    """Its middle is."""
+    name, (x, y, heading, length, width), velocity = body
+    moments = []
+    for k in range(10):
+        row: Row = (name, (x + 0.1 * k * velocity[0], y, heading, length, width), velocity)
+        one = moment(0.1 * k, 48.0 + k, 10.0, offset=-0.12 * k, heading=-0.1, objects=[row])
+        classes = np.array([int(kind)])
+        moments.append(msgspec.structs.replace(one, objects=msgspec.structs.replace(one.objects, classes=classes)))
+    (violation,) = judged(Collision, moments).violations
+    assert violation.contact in {Contact.ACTIVE_FRONT, Contact.ACTIVE_SIDE}
+
+
+def test_what_never_moves_does_not_run_into_an_ego_that_creeps() -> None:
+    moments = []
+    for k in range(20):
+        one = moment(0.1 * k, 49.9 + 0.009 * k, 0.09, objects=[car("poi:cone", 50.0)])
+        classes = np.array([int(ObjectClass.STATIC)])
+        moments.append(msgspec.structs.replace(one, objects=msgspec.structs.replace(one.objects, classes=classes)))
+    (violation,) = judged(Collision, moments).violations
+    assert violation.contact is Contact.ACTIVE_FRONT
 
 
 def test_two_contacts_at_once_are_both_returned() -> None:

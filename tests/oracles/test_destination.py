@@ -1,5 +1,5 @@
 import pytest
-from oracle_scenes import drive, judged, moment
+from oracle_scenes import drive, judged, moment, straight_road
 
 from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.truth import Moment
@@ -30,6 +30,19 @@ def test_passing_the_destination_without_a_stop_is_an_overrun() -> None:
     (violation,) = judged(Destination, drive(240.0, 260.0, 5.0), ended=Ending.CUT).violations
     assert violation.kind == "destination_overrun"
     assert violation.time == pytest.approx(2.7, abs=0.11)
+
+
+@pytest.mark.parametrize("station", [254.0, 262.0, 270.0])
+def test_past_the_end_of_the_road_the_way_beyond_counts(station: float) -> None:
+    """The destination is where a road ends that leads nowhere, unless a trip says otherwise."""
+    found = judged(Destination, stopping_at(station), straight_road(length=250.0))
+    assert "destination_overrun" in {violation.kind for violation in found.violations}
+
+
+@pytest.mark.parametrize("station", [250.0, 252.9])
+def test_no_farther_past_the_end_of_the_road_than_elsewhere_is_there(station: float) -> None:
+    road = straight_road(length=250.0)
+    assert judged(Destination, stopping_at(station), road, ended=Ending.ARRIVED).answer is Answer.KEPT
 
 
 def test_what_comes_after_the_arrival_is_not_judged() -> None:

@@ -213,9 +213,7 @@ def test_being_run_into_from_behind_is_the_others_unless_the_ego_left_its_lane(r
     assert at_contact(hit(LANE_Y), roads) == [("collision", AtFault.OTHER)]
     assert at_contact(hit(LANE_Y + 1.6), roads) == [("collision", AtFault.DRIVER)]
     aslant = [msgspec.structs.replace(one, ego=msgspec.structs.replace(one.ego, heading=0.4)) for one in hit(LANE_Y)]
-    assert at_contact(aslant, roads) == [
-        ("collision", AtFault.OTHER)
-    ]  # its front has swept out, its rear is in the lane
+    assert at_contact(aslant, roads) == [("collision", AtFault.OTHER)]  # its front has swept out, its rear has not
 
 
 @pytest.mark.parametrize(("heading", "fault"), [(0.2, AtFault.OTHER), (0.0, AtFault.DRIVER), (-0.2, AtFault.DRIVER)])
@@ -241,6 +239,25 @@ def test_a_touched_flank_is_the_others_in_the_egos_lane_and_not_on_a_junction(
     where = [(front - 7.0 + 0.5 * k, LANE_Y + 5.1 - 0.35 * k) for k in range(14)]
     moments = [moment(0.1 * k, front - 3.0 + 0.5 * k, 5.0, [("side", place, 5.0)]) for k, place in enumerate(where)]
     touching = next(k for k, (_, y) in enumerate(where) if y - LANE_Y <= 1.8)
+    assert at_contact(moments[: touching + 1], roads)[-1] == ("collision", fault)
+
+
+def test_a_flank_touched_by_who_stands_is_the_drivers(roads: RoadMap) -> None:
+    parked: Row = ("parked", (53.0, LANE_Y + 2.5), 0.0)
+    moments = [moment(0.1 * k, 56.0 + 0.05 * k, 0.5, [parked], y=LANE_Y + 0.1 * k) for k in range(10)]
+    touching = next(k for k in range(10) if 0.1 * k > 0.7)
+    assert at_contact(moments[: touching + 1], roads) == [("collision", AtFault.DRIVER)]
+
+
+@pytest.mark.parametrize(("y", "fault"), [(-1.6, AtFault.OTHER), (1.6, AtFault.DRIVER)])
+def test_a_flank_touched_in_a_lane_that_leads_the_other_way_is_the_drivers(
+    roads: RoadMap, y: float, fault: AtFault
+) -> None:
+    """Between the lanes is the middle of the street."""
+    side = 1.0 if y > 0.0 else -1.0
+    where = [(47.0 + 0.5 * k, y - side * (3.0 - 0.2 * k)) for k in range(10)]
+    moments = [moment(0.1 * k, 50.0 + 0.5 * k, 5.0, [("side", place, 5.0)], y=y) for k, place in enumerate(where)]
+    touching = next(k for k, (_, one) in enumerate(where) if abs(one - y) <= 1.8)
     assert at_contact(moments[: touching + 1], roads)[-1] == ("collision", fault)
 
 

@@ -34,6 +34,18 @@ def test_a_drive_ends_when_the_ego_stands_at_its_destination(tmp_path: Path, str
     assert abs(station - record.route.destination) < 3.0
 
 
+def test_who_waits_short_of_a_destination_told_more_narrowly_has_not_arrived(tmp_path: Path, street: Path) -> None:
+    """Behind somebody who goes on after 40 s."""
+    waiting = STOPPED.replace('departPos="50"', 'departPos="60"').replace(
+        'endPos="51" duration="1000"', 'endPos="99" duration="40"'
+    )
+    ego = to(91.0).replace("/>", '><param key="dvca.destination_tolerance" value="1"/></trip>')
+    record = driven(scenario_file(tmp_path, street, waiting + ego))
+    assert record.ending is Ending.ARRIVED
+    assert record.violations == []
+    assert record.moments[-1].time > 40.0
+
+
 def test_a_stop_time_cuts_the_drive_and_leaves_the_mission_open(tmp_path: Path, street: Path) -> None:
     record = driven(scenario_file(tmp_path, street), stop=StopRule(at=2.0))
     assert record.ending is Ending.CUT
