@@ -133,7 +133,7 @@ class World:
     def observe(self, ego: Ego | Native) -> Moment:
         """The truth about an ego at this world step."""
         truth = ego.truth
-        moving = on_level(self._session.objects(ego.name), ego.route, ego.station())
+        moving = on_level(*self._session.objects(ego.name), ego.route, ego.station())
         return Moment(
             ego=truth,
             shape=ego.shape,

@@ -37,6 +37,17 @@ def test_bodies_on_the_bridge_are_not_there_and_those_before_it_are(tmp_path: Pa
     assert len(moment.objects.classes) == len(moment.objects.velocities) == 2
 
 
+def test_people_on_the_bridge_are_not_there_either(tmp_path: Path, plain_file: Callable[..., Path]) -> None:
+    net = plain_file(NODES, EDGES.replace('speed="13.9"', 'speed="13.9" sidewalkWidth="2"'))
+    people = "".join(
+        f'<person id="{name}" depart="0" departPos="{at}"><stop edge="{edge}" endPos="{at}" duration="99"/></person>'
+        for name, edge, at in (("above", "sn", 150.0), ("coming", "sn", 100.0), ("ahead", "we", 197.0))
+    )
+    ego = EGO.replace('departLane="0"', 'departLane="1"')
+    moment = watched(scenario_file(tmp_path, net, ego + people), 5)[-1]
+    assert set(moment.objects.ids) == {"person:coming", "person:ahead"}
+
+
 def test_a_bridge_far_along_the_route_hides_nobody(tmp_path: Path, plain_file: Callable[..., Path]) -> None:
     """The route comes by the same place again on the other level: what is on its road there is met now."""
     nodes = (

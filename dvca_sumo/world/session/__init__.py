@@ -194,8 +194,8 @@ class Session:
         if has(ego):
             libsumo.vehicle.remove(ego)
 
-    def objects(self, watched: str) -> ObjectsTruth:
-        """Every moving body near a watched vehicle: vehicles (parked ones too), people on foot."""
+    def objects(self, watched: str) -> tuple[ObjectsTruth, list[str]]:
+        """Every moving body near a watched vehicle, and the edge that each one on foot is on; see `Sight`."""
         return self._sight.objects(watched)
 
     def signals(self, signal_ids: tuple[str, ...]) -> dict[str, SignalColour]:

@@ -74,8 +74,11 @@ class Sight:
         self._vehicles.clear()
         self._people.clear()
 
-    def objects(self, watched: str) -> ObjectsTruth:
-        """Every moving body near a watched vehicle: vehicles (parked ones too), people on foot."""
+    def objects(self, watched: str) -> tuple[ObjectsTruth, list[str]]:
+        """Every moving body near a watched vehicle: vehicles (parked ones too), people on foot.
+
+        With them the edges that people are on, "" of vehicles.
+        """
         time, seen = libsumo.simulation.getTime(), list[_Seen]()
         for name, kinds in libsumo.vehicle.getContextSubscriptionResults(watched).items():
             if _VEHICLE in kinds and name != watched:
@@ -95,7 +98,8 @@ class Sight:
             placed = self._footing.placed(time, people, list(edges.values()), motion[:, :2], headings, speeds)
             for row, place in zip(edges, placed.tolist(), strict=True):
                 motions[4 * row : 4 * row + 2] = place
-        return self._crowds[watched].seen(time, names, motions, [one.lane for one in seen], self._bodies)
+        found = self._crowds[watched].seen(time, names, motions, [one.lane for one in seen], self._bodies)
+        return found, [one.ground for one in seen]
 
     def _walking_area(self, edge: str) -> tuple[Shape, list[Strip]]:
         """The outline of a walking area, and the lanes of vehicles at its junction."""
