@@ -8,6 +8,8 @@ from typing import NamedTuple, Protocol
 
 import shapely
 
+_NEAR = 0.5  # [m] along a line, before and after a place on it, between which it is taken to be straight
+
 
 class Link(NamedTuple):
     """How one gets from a lane to a lane of a road."""
@@ -62,6 +64,13 @@ def edge_of(lane: str) -> str:
 def junction_of(lane: str) -> str:
     """The junction of one of its lanes, with the colon that begins their names."""
     return edge_of(edge_of(lane))
+
+
+def is_left_of(middle: shapely.LineString, x: float, y: float) -> bool:
+    """Whether a place [m] is on the left of a lane's centre line."""
+    along = middle.project(shapely.Point(x, y))
+    before, after = middle.interpolate(max(along - _NEAR, 0.0)), middle.interpolate(along + _NEAR)
+    return bool((after.x - before.x) * (y - before.y) > (after.y - before.y) * (x - before.x))
 
 
 def is_for_cars(net: Net, lane: str) -> bool:

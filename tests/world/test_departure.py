@@ -23,6 +23,21 @@ def test_a_vehicle_of_a_flow_can_be_the_ego(tmp_path: Path, street: Path) -> Non
     assert (entry.ego, entry.edges) == ("many.3", ("ab", "bc"))
 
 
+@pytest.mark.parametrize("is_left_hand", [False, True])
+@pytest.mark.parametrize("aside", ["left", "center", "right"])
+def test_an_ego_departs_on_the_side_of_its_lane_where_sumo_has_it(
+    tmp_path: Path, grid_file: Callable[..., Path], aside: str, *, is_left_hand: bool
+) -> None:
+    """SUMO counts to the other side where traffic keeps left."""
+    net = grid_file("--lefthand") if is_left_hand else grid_file()
+    trip = f'<trip id="ego" from="A1B1" to="B1C1" depart="0" departPos="50" departPosLat="{aside}"/>'
+    entry = entered(scenario_file(tmp_path, net, trip))
+    line = RoadMap.load(net).lanes[entry.lane].line
+    (_, (beside,)) = line.project([[entry.front_x, entry.front_y]])
+    assert entry.beside == pytest.approx(beside, abs=1e-6)
+    assert (abs(beside) > 0.5) == (aside != "center")
+
+
 def test_auto_takes_the_first_car_that_meets_traffic(tmp_path: Path, street: Path) -> None:
     bus = '<vType id="bus" vClass="bus"/><vehicle id="bus" type="bus" depart="60"><route edges="nb bs"/></vehicle>'
     entry = entered(scenario_file(tmp_path, street, FLOW + bus), ego="auto")

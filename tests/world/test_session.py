@@ -359,6 +359,7 @@ ON_LANE = 'lane="bc_0" startPos="40" endPos="60"'
         (f'{ON_LANE} duration="60" parking="true"', "bc_0 at 60 m"),
         (f'{ON_LANE} triggered="true"', "bc_0 at 60 m"),
         (f'{ON_LANE} speed="3"', "bc_0 at 60 m"),
+        ('edge="bc" endPos="60" duration="60"', "an edge at 60 m"),
         ('busStop="market" duration="60"', "market"),
         ('containerStop="dock" duration="60"', "dock"),
         ('chargingStation="socket" duration="60"', "socket"),

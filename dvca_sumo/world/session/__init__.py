@@ -10,6 +10,7 @@ Rules of this room:
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import libsumo
 import msgspec
@@ -18,6 +19,7 @@ from dvca_sumo.messages import SignalColour
 from dvca_sumo.scenario import Scenario, ScenarioError, input_words
 from dvca_sumo.truth import ObjectsTruth
 from dvca_sumo.world.entry import Entry
+from dvca_sumo.world.net import is_left_of
 from dvca_sumo.world.obstacles import Obstacles
 from dvca_sumo.world.session.egos import ANY_BRAKING, NEVER_TELEPORTED, Egos
 from dvca_sumo.world.session.net import SumoNet
@@ -65,10 +67,10 @@ class Session:
         except _GIVES_UP as error:
             libsumo.close()  # else what it had loaded would stay
             raise ScenarioError(f"SUMO cannot start {scenario.configuration.path}: {_in_one_line(error)}") from None
-        net = SumoNet()
-        ways = Ways(net)
-        self.egos = Egos(net, ways)
-        self._sight = Sight(net, ways)
+        self._net = SumoNet()
+        ways = Ways(self._net)
+        self.egos = Egos(self._net, ways)
+        self._sight = Sight(self._net, ways)
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
 
     @property
@@ -117,6 +119,8 @@ class Session:
         of = libsumo.vehicle
         x, y = of.getPosition(vehicle)
         row = of.getRouteIndex(vehicle)
+        lane, aside = of.getLaneID(vehicle), abs(of.getLateralLanePosition(vehicle))
+        middle, _ = self._net.middle(lane)  # SUMO counts to the other side where traffic keeps left
         texts = {name: of.getParameter(vehicle, f"dvca.{name}") for name in settings}
         return Entry(
             ego=vehicle,
@@ -130,10 +134,10 @@ class Session:
             vehicle_class=of.getVehicleClass(vehicle),
             edges=tuple(of.getRoute(vehicle)[row:]),
             skipped=row,
-            lane=of.getLaneID(vehicle),
+            lane=lane,
             position=of.getLanePosition(vehicle),
-            beside=of.getLateralLanePosition(vehicle),
-            stops=tuple(stop.stoppingPlaceID or f"{stop.lane} at {stop.endPos:g} m" for stop in of.getStops(vehicle)),
+            beside=aside if is_left_of(middle, x, y) else -aside,
+            stops=tuple(map(_named, of.getStops(vehicle))),
             parameters={name: text for name, text in texts.items() if text},
         )
 
@@ -213,6 +217,11 @@ class Session:
     def close(self) -> None:
         """End the simulation; the process may start another."""
         libsumo.close()
+
+
+def _named(stop: Any) -> str:
+    """A stop of a vehicle's own: its place, or where on its lane; of one on any lane of an edge SUMO tells neither."""
+    return stop.stoppingPlaceID or f"{stop.lane or 'an edge'} at {stop.endPos:g} m"
 
 
 def _in_one_line(error: Exception) -> str:
