@@ -11,7 +11,15 @@ from pathlib import Path
 
 import msgspec
 
-from dvca_sumo.analysis.attribution import Attribution, Progress, Request, explain, factual_run
+from dvca_sumo.analysis.attribution import (
+    Attribution,
+    AttributionStoppedError,
+    Progress,
+    Request,
+    explain,
+    factual_run,
+    unexplained,
+)
 from dvca_sumo.engine.fork import IS_AVAILABLE, ForkEngine
 from dvca_sumo.engine.protocol import Engine
 from dvca_sumo.engine.replay import ReplayEngine
@@ -94,8 +102,15 @@ def attribute(drive: FactualDrive, progress: Progress | None = None, *, certify:
         witness = drive.engine.witness if certify else None
         progress, from_start = progress or Progress(), _is_copied(drive)
         return explain(drive.engine, drive.request, drive.record, progress, witness, from_start=from_start)
+    except KeyboardInterrupt:
+        raise AttributionStoppedError(unattributed(drive)) from None
     finally:
         drive.engine.close()
+
+
+def unattributed(drive: FactualDrive) -> Attribution:
+    """What a drive shows by itself, when its attribution is interrupted before it begins."""
+    return msgspec.structs.replace(unexplained(drive.record), reason="interrupted")
 
 
 def _is_copied(drive: FactualDrive) -> bool:

@@ -8,6 +8,13 @@ import msgspec
 
 from dvca_sumo.messages import Floats, Integers, SignalColour, VehicleShape
 
+_DRAWN = "polygon:"
+
+
+def whole(name: str) -> str:
+    """The id of a drawn thing, of that of one of its parts; of everything else it is the same."""
+    return name.rpartition("#")[0] if name.startswith(_DRAWN) and "#" in name else name
+
 
 class EgoTruth(msgspec.Struct, frozen=True, gc=False):
     """The ego's true motion at one instant; the pose is that of the rear axle centre."""

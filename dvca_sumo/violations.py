@@ -4,6 +4,8 @@ import enum
 
 import msgspec
 
+from dvca_sumo.truth import whole
+
 
 class Category(enum.StrEnum):
     """The three families of violations."""
@@ -35,6 +37,11 @@ class Violation(msgspec.Struct, frozen=True):
     threshold: float | None  # what it had to keep
     detail: str  # one phrase for people
     contact: Contact | None = None  # collisions only
+
+    @property
+    def whom(self) -> str:
+        """The other party, parts of what is drawn being one; empty where there is none."""
+        return whole(self.object or "")
 
 
 class Answer(enum.StrEnum):

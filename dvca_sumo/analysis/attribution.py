@@ -151,12 +151,9 @@ def explain(
     Raises:
         AttributionStoppedError: The user interrupted it.
     """
-    doubts = _doubts(record)
-    verdict = Verdict.UNRESOLVED if doubts else Verdict.NONE
-    found = Attribution(record, record.digest, None, verdict, True, doubts, math.inf)
+    found = unexplained(record)
     if not record.violations:
         return replace(found, planted=_planted(request.faults, found))
-    found = replace(found, violation=principal(record.violations), verdict=Verdict.UNRESOLVED)
     asked: list[Dtest] = []
     try:
         found = replace(found, at_fault=at_fault(record, engine.roadmap))
@@ -171,6 +168,15 @@ def explain(
     except KeyboardInterrupt:
         raise AttributionStoppedError(replace(found, probes=_all_probes(asked), reason="interrupted")) from None
     return replace(found, probes=_all_probes(asked), planted=_planted(request.faults, found))
+
+
+def unexplained(record: Record) -> Attribution:
+    """What a factual run shows by itself."""
+    doubts = _doubts(record)
+    if not record.violations:
+        verdict = Verdict.UNRESOLVED if doubts else Verdict.NONE
+        return Attribution(record, record.digest, None, verdict, True, doubts, math.inf)
+    return Attribution(record, record.digest, principal(record.violations), Verdict.UNRESOLVED, True, doubts, math.inf)
 
 
 def attribute(engine: Engine, request: Request, progress: Progress) -> Attribution:

@@ -120,7 +120,7 @@ def _breach(
     moments = _driven(record, trajectory, tick)
     for judgement in judge(moments, judges(places_of(record, roadmap, tick), thresholds), Ending.CUT):
         for found in judgement.violations:
-            if is_same_family(found.kind, violation) and found.object == violation.object:
+            if is_same_family(found.kind, violation) and found.whom == violation.whom:
                 return f"driven as planned it leads to {found.kind} in {found.time - moments[0].time:.1f} s"
     return ""
 

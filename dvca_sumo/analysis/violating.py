@@ -16,7 +16,7 @@ def principal(violations: Sequence[Violation]) -> Violation:
     first = violations[0]
     if first.kind in PRECURSORS:
         for later in violations[1:]:
-            if later.contact is not None and later.object == first.object and later.time - first.time <= _LEADS_TO:
+            if later.contact is not None and later.whom == first.whom and later.time - first.time <= _LEADS_TO:
                 return later
     return first
 

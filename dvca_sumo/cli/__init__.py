@@ -12,7 +12,7 @@ from dvca_sumo.cli.listing import faults
 from dvca_sumo.cli.output import ExitCode, OutputError, tell
 from dvca_sumo.cli.running import run
 from dvca_sumo.cli.screening import screen
-from dvca_sumo.engine.processes import stop_when_terminated
+from dvca_sumo.engine.processes import stop_once
 from dvca_sumo.engine.protocol import RunFailedError
 from dvca_sumo.interventions import FaultError
 from dvca_sumo.roadmap import RoadMapError
@@ -39,7 +39,7 @@ for command in (run, screen, faults, bench):
 
 def main() -> NoReturn:
     """The program: every error is one line and an exit code of the contract."""
-    stop_when_terminated()
+    stop_once()
     try:
         program.main(prog_name="dvca-sumo", standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:

@@ -18,7 +18,7 @@ from dvca_sumo.bench.random_faults import PATIENCE, Drawing, random_scores
 from dvca_sumo.bench.runs import Setting
 from dvca_sumo.bench.score import Score
 from dvca_sumo.bench.tables import Gap, json_of, markdown_page, summaries, terminal_text
-from dvca_sumo.cli.output import deliver, make_folder, tell
+from dvca_sumo.cli.output import Folder, deliver, make_folder, tell
 from dvca_sumo.cli.running import REPEATS
 from dvca_sumo.store import Store
 
@@ -53,7 +53,7 @@ class _Countdown:
 @click.option("--repeats", type=click.IntRange(1), help=f"Runs of each question in jitter mode [default: {REPEATS}]")
 @click.option("--baselines", is_flag=True, help="Beside ours: observation, whole runs, the paper's procedure, ddmin.")
 @click.option("--jobs", type=click.IntRange(1), default=CPUS, show_default=True, help="Cases at once.")
-@click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Results; to go on from there.")
+@click.option("-o", "--output", type=Folder(), help="Results; to go on from there.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
 def bench(
     sumocfg: Path | None,

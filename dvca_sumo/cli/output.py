@@ -25,6 +25,20 @@ class ExitCode(IntEnum):
     INTERRUPTED = 130
 
 
+class Folder(click.Path):
+    """A folder that is to be written into, named in so many words: an empty name is a variable that is not set."""
+
+    def __init__(self) -> None:
+        super().__init__(file_okay=False, path_type=Path)
+
+    def convert(self, value: str | os.PathLike[str], param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """See `click.Path`."""
+        if value == "":
+            self.fail("the folder's name is empty", param, ctx)
+        super().convert(value, param, ctx)
+        return Path(value)
+
+
 def tell(line: str) -> None:
     """One line on standard error, as long as anybody listens."""
     _printed(line, is_error=True)

@@ -12,7 +12,7 @@ from dvca_sumo.analysis.attribution import Attribution, AttributionStoppedError,
 from dvca_sumo.analysis.components import Verdict
 from dvca_sumo.analysis.dtest import Probe
 from dvca_sumo.api import CPUS, FactualDrive, load_scenario
-from dvca_sumo.cli.output import ExitCode, deliver, make_folder, tell
+from dvca_sumo.cli.output import ExitCode, Folder, deliver, make_folder, tell
 from dvca_sumo.record import Record
 from dvca_sumo.report.result import Timing, result_of
 from dvca_sumo.report.terminal import verdict_text
@@ -59,7 +59,7 @@ class _Terminal(Progress):
 @click.option("--certify", is_flag=True, help="Ask the conclusion once more of the replay engine, from time 0.")
 @click.option("--begin", type=float, metavar="T", help="Start of the simulation [s].")
 @click.option("--end", type=float, metavar="T", help="Latest end of the simulation [s].")
-@click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Folder for result.json.")
+@click.option("-o", "--output", type=Folder(), help="Folder for result.json.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
 def run(
     sumocfg: Path,
@@ -99,16 +99,23 @@ def run(
     terminal = _Terminal(jobs)
     scenario = load_scenario(sumocfg, ego, seed, begin, end)
     drive = api.drive(scenario, faults, stack, (repeats or REPEATS) if jitter else None, jobs, engine, bug)
+    try:
+        found, is_whole = _attributed(drive, terminal, certify=certify), True
+    except AttributionStoppedError as stopped:
+        found, is_whole = stopped.partial, False
+    except KeyboardInterrupt:  # before the first question
+        found, is_whole = api.unattributed(drive), False
+    _publish(drive, found, terminal.timing(drive.engine.name), output, as_json=as_json)
+    if not is_whole:
+        raise KeyboardInterrupt
+    sys.exit(_exit_code(found))
+
+
+def _attributed(drive: FactualDrive, terminal: _Terminal, *, certify: bool) -> Attribution:
     terminal.factual(drive.record)
     if drive.engine.fallback is not None:
         tell(f"engine {drive.engine.name}: {drive.engine.fallback}")
-    try:
-        found = api.attribute(drive, terminal, certify=certify)
-    except AttributionStoppedError as stopped:
-        _publish(drive, stopped.partial, terminal.timing(drive.engine.name), output, as_json=as_json)
-        raise KeyboardInterrupt from None
-    _publish(drive, found, terminal.timing(drive.engine.name), output, as_json=as_json)
-    sys.exit(_exit_code(found))
+    return api.attribute(drive, terminal, certify=certify)
 
 
 def _publish(drive: FactualDrive, found: Attribution, timing: Timing, output: Path | None, *, as_json: bool) -> None:

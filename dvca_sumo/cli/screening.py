@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from dvca_sumo.api import CPUS, load_scenario
-from dvca_sumo.cli.output import ExitCode, deliver, make_folder, tell
+from dvca_sumo.cli.output import ExitCode, Folder, deliver, make_folder, tell
 from dvca_sumo.scenario import AUTO
 from dvca_sumo.screen.driving import Driven, Heard
 from dvca_sumo.screen.screening import Progress, Setting, Stores, screened
@@ -66,7 +66,7 @@ class _Terminal(Progress):
 @click.option("--begin", type=float, metavar="T", help="Start of the simulation [s].")
 @click.option("--end", type=float, metavar="T", help="Trips are to be over by then, if they are not held up [s].")
 @click.option("--jobs", type=click.IntRange(1), default=CPUS, show_default=True, help="Simulations at once.")
-@click.option("-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Results; to go on from there.")
+@click.option("-o", "--output", type=Folder(), help="Results; to go on from there.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
 def screen(
     sumocfg: Path,

@@ -138,9 +138,19 @@ def _work(job: Callable[[], object], sender: Connection, log: Path, parent: int)
     os._exit(0)  # SUMO's and the test runner's exit handlers are not this process's business
 
 
-def stop_when_terminated() -> None:
-    """Take a request to terminate, as batch systems send it, for an interrupt: nothing computed is lost."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+def stop_once() -> None:
+    """Take a request to terminate, as batch systems send it, for an interrupt, and heed the first of either alone.
+
+    Nothing computed is lost then, though some send two: what the first one has printed and kept, another cuts short.
+    """
+    for one in _INTERRUPTS:
+        if signal.getsignal(one) is not signal.SIG_IGN:
+            signal.signal(one, _stop)
+
+
+def _stop(_number: int, _frame: object) -> None:
+    ignore_interrupts()
+    raise KeyboardInterrupt
 
 
 def ignore_interrupts() -> None:

@@ -5,7 +5,8 @@ import numpy as np
 from dvca_sumo.geometry.frames import Pose, transferred
 from dvca_sumo.interventions.selection import Occasion
 from dvca_sumo.interventions.states import UNITS
-from dvca_sumo.messages import Integers, ObjectClass, TrackedObjects
+from dvca_sumo.messages import Floats, Integers, ObjectClass, TrackedObjects
+from dvca_sumo.truth import ObjectsTruth, whole
 
 IN_WAY = "in_way"
 ALL = "all"
@@ -21,19 +22,20 @@ _DRIVING_AHEAD = np.arange(3) * 0.5  # [s] vehicles follow lanes: their course i
 def rows_of(which: str, tracked: TrackedObjects, occasion: Occasion) -> Integers:
     """Rows of `tracked` that `which` names: an object id, `IN_WAY` or `ALL`; empty when none does.
 
-    Messages carry no simulator ids: the true object is placed as the ego would believe it, and the
-    nearest tracked object within a gate is taken to be it.
+    The id of a drawn thing names all its parts. Messages carry no simulator ids: a true object is placed as the ego
+    would believe it, and the nearest tracked object within a gate is taken to be it.
     """
     if which == ALL:
         return np.arange(len(tracked.ids))
     truth = occasion.moment.objects
-    row = in_way(occasion) if which == IN_WAY else _row_by_id(which, truth.ids)
-    if row is None or len(tracked.ids) == 0:
+    first = in_way(occasion) if which == IN_WAY else None
+    rows = _rows_by_id(which, truth.ids) if which != IN_WAY else [] if first is None else [first]
+    if not rows or len(tracked.ids) == 0:
         return np.zeros(0, dtype=np.int64)
-    place = transferred(truth.boxes[row : row + 1, :3], true_pose(occasion), believed_pose(occasion))[0]
-    gaps = np.hypot(tracked.boxes[:, 0] - place[0], tracked.boxes[:, 1] - place[1])
-    nearest = int(np.argmin(gaps))
-    return np.array([nearest] if gaps[nearest] < _GATE else [], dtype=np.int64)
+    places = transferred(truth.boxes[rows, :3], true_pose(occasion), believed_pose(occasion))
+    gaps = np.hypot(*(tracked.boxes[:, axis] - places[:, axis, None] for axis in (0, 1)))
+    nearest = gaps.argmin(axis=1)[gaps.min(axis=1) < _GATE]
+    return np.unique(nearest)
 
 
 def in_way(occasion: Occasion) -> int | None:
@@ -55,7 +57,7 @@ def in_way(occasion: Occasion) -> int | None:
         return None
     owners, points = owners[near], points[near]
     stations, offsets = line.project(points, between=(front - 5.0, front + _AHEAD))
-    reach = 0.5 * (moment.shape.width + objects.boxes[owners, 4]) + _MARGIN
+    reach = 0.5 * moment.shape.width + _half_widths(objects, line.headings_at(stations), owners) + _MARGIN
     # The ends of the searched stretch collect everything beyond it; those points are not on the way.
     blocks = (np.abs(offsets) < reach) & (stations > front) & (stations < front + _AHEAD - 1.0)
     if not blocks.any():
@@ -75,8 +77,15 @@ def believed_pose(occasion: Occasion) -> Pose:
     return (believed.x, believed.y, believed.heading)
 
 
-def _row_by_id(name: str, ids: tuple[str, ...]) -> int | None:
-    for row, known in enumerate(ids):
-        if name in (known, known.partition(":")[2]):
-            return row
-    return None
+def _half_widths(objects: ObjectsTruth, headings: Floats, rows: Integers) -> Floats:
+    """How far objects `rows` (k,) reach across a line of such `headings` (k,) [m]; people as far however they turn."""
+    lengths, widths = objects.boxes[rows, 3:].T
+    turns = np.where(objects.classes[rows] == ObjectClass.PEDESTRIAN, 0.0, objects.boxes[rows, 2] - headings)
+    found: Floats = 0.5 * (lengths * np.abs(np.sin(turns)) + widths * np.abs(np.cos(turns)))
+    return found
+
+
+def _rows_by_id(name: str, ids: tuple[str, ...]) -> list[int]:
+    names = ((known, known.partition(":")[2]) for known in ids)
+    found = [row for row, those in enumerate(names) if name in those]
+    return found or [row for row, known in enumerate(ids) if name in (whole(known), whole(known).partition(":")[2])]

@@ -80,6 +80,7 @@ def _whose(judged: Judged | None) -> Iterator[str]:
         yield "  doing    not known: it takes SUMO's own driver on the same trip, as `dvca-sumo screen` has it"
     elif judged.fault is not AtFault.DRIVER:
         yield f"  doing    {_WHOSE[judged.fault]}: {judged.reason}"
+        yield "           what follows is what would have avoided it all the same"
 
 
 def _stops(record: Record) -> Iterator[str]:
@@ -167,6 +168,8 @@ def _built_with(found: Attribution, bug: str | None) -> Iterator[str]:
 
 
 def _altered(planted: Planted) -> str:
+    if not planted.altered:
+        return f"{planted.component.value} fault, which never acted: no message altered"
     return f"{planted.component.value} fault, {len(planted.altered)} messages altered"
 
 

@@ -90,7 +90,7 @@ def judged(
 
 
 def _belongs(violation: Violation, contact: Violation) -> bool:
-    return violation.object == contact.object and contact.time - violation.time <= _BEFORE
+    return violation.whom == contact.whom and contact.time - violation.time <= _BEFORE
 
 
 def _excuse(contact: Violation, moment: Moment, roadmap: RoadMap) -> str:

@@ -29,7 +29,7 @@ def checked(answer: object, kind: type[Answer]) -> Answer:
 
 def told(error: BaseException) -> str:
     """What a component raised, in a line."""
-    said = f"{type(error).__name__}: {error}"
+    said = " ".join(f"{type(error).__name__}: {error}".split())
     return f"{said} (messages given or returned are not to be written to)" if "read-only" in said else said
 
 

@@ -3,6 +3,7 @@
 import difflib
 import hashlib
 import math
+import os
 import re
 import xml.etree.ElementTree as ET
 from functools import cache
@@ -67,6 +68,9 @@ OUTPUTS = frozenset(
 _LEAVES = ("save-configuration", "save-template", "save-schema")
 
 
+_VARIABLE = re.compile(r"\$\{([^}]+)\}")
+
+
 class Configuration(msgspec.Struct, frozen=True):
     """What a sumocfg says. Paths are absolute; options are under SUMO's canonical names."""
 
@@ -125,7 +129,7 @@ def read_configuration(path: Path) -> Configuration:
     for element in root.iter():
         value = element.get("value", element.get("v"))
         if element is not root and value is not None:
-            options[SYNONYMS.get(element.tag, element.tag)] = value
+            options[SYNONYMS.get(element.tag, element.tag)] = _VARIABLE.sub(_of_environment, value)
     if options.get("mesosim", "false").lower() in ("true", "1", "yes", "on"):
         raise ScenarioError(f"{path} asks for the mesoscopic model (mesosim), in which no ego can be moved")
     for name in _LEAVES:
@@ -141,6 +145,10 @@ def read_configuration(path: Path) -> Configuration:
         routes=_files(path, options, "route-files"),
         additionals=_files(path, options, "additional-files"),
     )
+
+
+def _of_environment(name: re.Match[str]) -> str:
+    return os.environ.get(name.group(1), "")  # as SUMO has it
 
 
 def content_of(path: Path) -> str:

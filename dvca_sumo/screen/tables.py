@@ -16,7 +16,7 @@ from dvca_sumo.screen.summary import DriverSummary, Quartiles, summary_of
 from dvca_sumo.screen.trips import Draw
 
 SCHEMA = 1
-_ALONE = {True: "yes", False: "no", None: "not known"}
+_ALONE = {True: "yes", False: "no, the command does not show it", None: "not known"}
 
 
 def json_of(screening: Screening) -> Json:
@@ -76,7 +76,7 @@ def terminal_text(screening: Screening) -> str:
     if listed:
         if any(one.fault is not AtFault.DRIVER for trip in screening.ads for one in trip.violations):
             listed.append("`run` looks for a component in those that are not the driver's, too.")
-        parts.append("Violations of the ADS, and how to see each\n" + "\n".join(listed))
+        parts.append("Violations of the ADS, and how to drive each of the trips alone\n" + "\n".join(listed))
     drivers = (("ADS", screening.ads), ("SUMO's driver", screening.sumo_driver))
     lost = [
         f"{driver} {trip.ego}: {trip.outcome.value}: {trip.reason}"

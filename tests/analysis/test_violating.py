@@ -26,6 +26,12 @@ def test_a_close_call_stands_for_itself_without_contact_with_that_object_soon_af
     assert principal([CLOSE, collision(15.9)]).kind == "collision"
 
 
+def test_parts_of_what_is_drawn_are_one_object() -> None:
+    close, contact = breach("ttc", Category.SAFETY, 10.0, "polygon:kerb#0"), collision(11.0, "polygon:kerb#1")
+    assert principal([close, contact]) is contact
+    assert principal([close, collision(11.0, "polygon:wall#1")]) is close
+
+
 def test_close_calls_and_contacts_are_one_family_and_other_kinds_are_their_own() -> None:
     assert is_same_family("ttc", collision(1.0))
     assert is_same_family("collision", CLOSE)

@@ -16,7 +16,11 @@ from dvca_sumo.cli import ExitCode, screening
 
 
 def interrupted(
-    words: Sequence[str], folder: Path, is_time: Callable[[str], bool], by: signal.Signals = signal.SIGINT
+    words: Sequence[str],
+    folder: Path,
+    is_time: Callable[[str], bool],
+    by: signal.Signals = signal.SIGINT,
+    times: int = 1,
 ) -> tuple[int, str, str]:
     """Exit code and output of a command that is interrupted once it has said such a line; nobody may be left behind."""
     alive, inherited = os.pipe()  # readable as soon as no process holds its other end any more
@@ -35,7 +39,8 @@ def interrupted(
         assert running.stderr is not None
         while not is_time(line := running.stderr.readline()):
             assert line, "it ended before that"
-        os.killpg(running.pid, by)  # as a terminal does: to parent and children alike
+        for _ in range(times):
+            os.killpg(running.pid, by)  # as a terminal does: to parent and children alike
         out, err = running.communicate(timeout=60)
     left_behind = not select.select([alive], [], [], 20.0)[0]
     os.close(alive)
@@ -44,10 +49,14 @@ def interrupted(
 
 
 @pytest.mark.skipif(os.name != "posix", reason="process groups")
-@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_analysis_prints_and_keeps_what_it_has_found(tmp_path: Path, by: signal.Signals) -> None:
+@pytest.mark.parametrize(("by", "times"), [(signal.SIGINT, 1), (signal.SIGTERM, 1), (signal.SIGINT, 3)])
+@pytest.mark.parametrize("after", ["probe ", "factual run: "])
+def test_an_interrupted_analysis_prints_and_keeps_what_it_has_found(
+    tmp_path: Path, by: signal.Signals, times: int, after: str
+) -> None:
+    """Some send one interrupt after the other, to the command and to its group."""
     words = ("run", "nets/cs1.sumocfg", "--fault", "perception.miss", "--json", "-o", str(tmp_path / "out"))
-    code, out, err = interrupted(words, tmp_path, lambda line: line.startswith("probe "), by)
+    code, out, err = interrupted(words, tmp_path, lambda line: line.startswith(after), by, times)
     assert code == ExitCode.INTERRUPTED
     assert "Traceback" not in err
     assert err.splitlines()[-1] == "interrupted"

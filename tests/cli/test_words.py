@@ -1,6 +1,6 @@
 """The words of a command line: wrong ones are told in one line, and help explains the right ones."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -75,6 +75,11 @@ def test_an_unknown_bug_is_bad_input(called: Called) -> None:
 @pytest.mark.parametrize("line", BAD_USAGE)
 def test_wrong_usage(called: Called, line: str) -> None:
     assert_one_error(called(*line.split()), ExitCode.USAGE, BAD_USAGE[line])
+
+
+@pytest.mark.parametrize("command", [("run", CS1), ("screen", CS1), ("bench",)])
+def test_a_folder_without_a_name_is_not_the_one_the_command_is_typed_in(called: Called, command: Sequence[str]) -> None:
+    assert_one_error(called(*command, "-o", ""), ExitCode.USAGE, "'-o'", "the folder's name is empty")
 
 
 def test_no_words_at_all_show_the_help(called: Called) -> None:

@@ -20,7 +20,7 @@ class FailsInCycle57:
         self, localization: LocalizationEstimate, predicted: PredictedObjects, signals: dict[str, SignalColour]
     ) -> Trajectory:
         if self._cycle == 57:
-            raise ArithmeticError("no convergence")
+            raise ArithmeticError("no\nconvergence")
         self._cycle += 1
         return self._planning.step(localization, predicted, signals)
 

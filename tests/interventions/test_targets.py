@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -52,6 +54,13 @@ def test_what_reaches_into_the_egos_width_is_in_the_way_and_just_beside_it_is_no
     assert found(replace(cone, y=1.41)) is None
 
 
+def test_what_stands_across_the_road_is_in_the_way_by_its_length() -> None:
+    barrier = Thing("barrier", 45.0, 3.0, kind=ObjectClass.STATIC, size=(5.0, 0.4), heading=math.pi / 2.0)
+    assert found(barrier) == "barrier"
+    assert found(replace(barrier, heading=0.0)) is None
+    assert found(replace(barrier, y=3.71)) is None
+
+
 def test_nothing_is_in_the_way_on_an_empty_road() -> None:
     assert found() is None
 
@@ -67,6 +76,14 @@ def test_an_id_names_its_object_with_and_without_its_prefix() -> None:
     for name in ("ped", "person:ped"):
         assert rows_of(name, tracked(things), occasion(things)).tolist() == [1]
     assert rows_of("lead", tracked(things), occasion(things)).tolist() == [0]
+
+
+def test_the_id_of_a_drawn_thing_names_all_its_parts() -> None:
+    parts = [Thing(f"polygon:kerb#{part}", 40.0 + 20.0 * part, -3.0, kind=ObjectClass.STATIC) for part in range(3)]
+    things = (LEAD, *parts)
+    for name in ("kerb", "polygon:kerb"):
+        assert rows_of(name, tracked(things), occasion(things)).tolist() == [1, 2, 3]
+    assert rows_of("kerb#1", tracked(things), occasion(things)).tolist() == [2]
 
 
 def test_all_names_every_tracked_object_also_one_that_does_not_exist() -> None:

@@ -97,6 +97,11 @@ def test_a_harmless_fault_is_mentioned() -> None:
     assert "3 messages altered" in said
 
 
+def test_a_fault_that_never_acted_is_told_so() -> None:
+    said = text(attributed(drive(), lambda _: SAFE, faults=(FAULTY,)))
+    assert "which never acted: no message altered" in line(said, "planted")
+
+
 def test_the_bug_of_the_build_is_held_against_the_answer() -> None:
     assert line(verdict_text(explained(), TIMING, "apollo-3634"), "BUG").endswith(
         "apollo-3634 (perception): component found"

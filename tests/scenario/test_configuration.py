@@ -203,3 +203,13 @@ def test_mesosim_switched_off_is_not_refused(tmp_path: Path, net: Path) -> None:
 def test_a_configuration_that_only_saves_options_is_refused(tmp_path: Path, net: Path, option: str) -> None:
     with pytest.raises(ScenarioError, match="leave without a simulation"):
         read_configuration(scenario_file(tmp_path, net, **{option: "out.xml"}))
+
+
+def test_environment_variables_stand_for_what_they_are_to_sumo(
+    tmp_path: Path, net: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROUTES_OF_TODAY", str(tmp_path))
+    monkeypatch.delenv("NOBODY_SETS_THIS", raising=False)
+    config = scenario_file(tmp_path / "elsewhere", net, route_files="${ROUTES_OF_TODAY}/${NOBODY_SETS_THIS}some.xml")
+    (tmp_path / "some.xml").write_text("<routes/>")
+    assert read_configuration(config).routes == (tmp_path / "some.xml",)
