@@ -79,7 +79,10 @@ def drive(
     Raises:
         ScenarioError, FaultError, StackError, BugError, RoadMapError: Bad input, in one line.
         RunFailedError: The run's process crashed or hung.
+        ValueError: No such number of repeats.
     """
+    if repeats is not None and repeats < 1:
+        raise ValueError(f"repeats is {repeats} (allowed: 1 or more, or None)")
     request = Request(scenario, tuple(planted_fault(text) for text in faults), repeats)
     source = StackSource(stack, bug)
     chosen = ENGINES[engine or DEFAULT_ENGINE](scenario.configuration.net, source, jobs)

@@ -96,6 +96,8 @@ def test_errors_are_named_for_what_was_wrong(tmp_path: Path) -> None:
         dvca_sumo.drive(scenario, faults=["planning.pat"])
     with pytest.raises(StackError, match="nowhere:stack"):
         dvca_sumo.drive(scenario, stack="nowhere:stack")
+    with pytest.raises(ValueError, match="repeats is 0 .allowed: 1 or more"):
+        dvca_sumo.drive(scenario, repeats=0)
 
 
 def test_the_package_offers_the_three_calls_and_nothing_unknown() -> None:

@@ -7,6 +7,7 @@ one such place.
 """
 
 import enum
+import math
 from collections.abc import Callable, Sequence
 
 import msgspec
@@ -69,5 +70,6 @@ def best_share(safe: float, violates: float) -> float:
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         middle = (low + high) / 2.0
-        low, high = (middle, high) if middle**safe < (1.0 - middle) ** violates else (low, middle)
+        is_low = safe * math.log(middle) < violates * math.log1p(-middle)  # the powers themselves may be too small
+        low, high = (middle, high) if is_low else (low, middle)
     return low

@@ -161,6 +161,7 @@ def change_speed(message: Message, parameters: Parameters, occasion: Occasion) -
         points[:, column] = np.interp(driven, rising, values)
     points[:, X] += beyond * math.cos(headings[-1])
     points[:, Y] += beyond * math.sin(headings[-1])
+    points[beyond > 0.0, CURVATURE] = 0.0
     points[:, SPEED] = speeds
     points[:, SPEED + 1] = np.append(np.diff(speeds) / time_steps, 0.0)
     return msgspec.structs.replace(trajectory, points=points)

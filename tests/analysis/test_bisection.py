@@ -62,8 +62,9 @@ def test_where_one_answer_costs_more_the_best_share_makes_a_search_cheaper_than_
     assert cost(best) <= min(cost(share) for share in (0.2, 0.35, 0.5, 0.65, 0.8)) * 1.02
 
 
-def test_equal_costs_are_searched_by_halves() -> None:
-    assert best_share(3.0, 3.0) == pytest.approx(0.5, abs=1e-5)
+@pytest.mark.parametrize("cost", [3.0, 3600.0])
+def test_equal_costs_are_searched_by_halves(cost: float) -> None:
+    assert best_share(cost, cost) == pytest.approx(0.5, abs=1e-5)
 
 
 @pytest.mark.parametrize("length", [2, 3, 10, 25, 40])

@@ -246,6 +246,15 @@ def test_a_curved_plan_is_followed_around_its_curve_at_the_wrong_speed() -> None
     np.testing.assert_allclose(said.points[:, CURVATURE], 1.0 / 40.0)
 
 
+def test_beyond_the_end_of_a_curved_plan_the_way_is_straight() -> None:
+    points = trajectory().points.copy()
+    points[:, CURVATURE] = 1.0 / 40.0
+    said = distorted_plan("change_speed", Trajectory(0.0, points, "cruise"), factor=2.0, error=0.0).points
+    is_beyond = said[:, X] > points[-1, X] + 1e-6
+    assert 0 < is_beyond.sum() < len(said)
+    np.testing.assert_allclose(said[:, CURVATURE], np.where(is_beyond, 0.0, 1.0 / 40.0))
+
+
 def test_a_plan_to_stand_that_is_driven_nevertheless_goes_straight_on() -> None:
     said = distorted_plan("change_speed", trajectory(NORTH, speed=0.0), factor=1.0, error=6.0)
     np.testing.assert_allclose(said.points[:, Y], 6.0 * said.points[:, T], atol=1e-6)
