@@ -96,7 +96,7 @@ def test_errors_are_named_for_what_was_wrong(tmp_path: Path) -> None:
         dvca_sumo.drive(scenario, faults=["planning.pat"])
     with pytest.raises(StackError, match="nowhere:stack"):
         dvca_sumo.drive(scenario, stack="nowhere:stack")
-    with pytest.raises(ValueError, match="repeats is 0 .allowed: 1 or more"):
+    with pytest.raises(ValueError, match=r"repeats is 0 \(allowed: 1 or more"):
         dvca_sumo.drive(scenario, repeats=0)
 
 
