@@ -55,8 +55,11 @@ class LaneChanger:
         self._lane = 0  # of its lanes, the one the ego is on
         self._target = 0  # of its lanes, the one the ego is to be on
 
-    def step(self, window: Window, offset: float, speed: float, objects: TrackedObjects) -> LaneChoice:
-        """The lane for a cycle in which the rear axle is at the window's origin, `offset` [m] beside its line."""
+    def step(self, window: Window, offset: float, lean: float, speed: float, objects: TrackedObjects) -> LaneChoice:
+        """The lane for a cycle in which the rear axle is at the window's origin, `offset` [m] beside its line.
+
+        The front is `lean` [m] farther to the left.
+        """
         nose = window.station + self._shape.front
         while self._next < len(self._changes) and nose >= self._changes[self._next].latest_station:
             self._next, self._lane, self._target = self._next + 1, 0, 0
@@ -68,12 +71,12 @@ class LaneChanger:
         here = change.centres(np.array([window.station]))[:, 0]
         if nose > change.start_station and abs(offset - here[self._target]) < ARRIVED:
             self._lane = self._target
-        return self._choice(change, window, offset - float(here[self._lane]), speed, objects)
+        return self._choice(change, window, offset - float(here[self._lane]), lean, speed, objects)
 
     def _choice(
-        self, change: LaneChange, window: Window, aside: float, speed: float, objects: TrackedObjects
+        self, change: LaneChange, window: Window, aside: float, lean: float, speed: float, objects: TrackedObjects
     ) -> LaneChoice:
-        """`aside` [m] is how far the ego is from its lane's centre."""
+        """`aside` [m] is how far the ego is from its lane's centre, its front by `lean` farther."""
         last = len(change.lanes) - 1
         if self._lane == last:
             return LaneChoice()
@@ -93,7 +96,7 @@ class LaneChanger:
             target += 1
         width, beside = change.widths[self._lane], occupied[self._lane + 1]
         if target < self._target and (
-            goes_on(aside, width, beside, self._shape)
+            goes_on(self._out(aside, lean, stop, speed), width, beside, self._shape)
             or is_caught(occupied[self._lane], beside, speed, self._shape, self._config)
         ):
             target = self._target
@@ -103,6 +106,14 @@ class LaneChanger:
             return LaneChoice(behind=behind)
         pace = self._gaps.pace(occupied[target + 1], change, window, speed)
         return LaneChoice(keeping(change, target, window, speed, stop, self._config), behind, pace)
+
+    def _out(self, aside: float, lean: float, stop: Stop, speed: float) -> float:
+        """How far out of its lane an ego is that is to give up a change [m]: its front, where there is no way back.
+
+        It would stop there turned, and too near to the end of the lane to begin again.
+        """
+        front = aside + lean
+        return front if blend_length(front, speed, self._config) > stop.at else aside
 
 
 def keeping(

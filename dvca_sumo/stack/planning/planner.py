@@ -120,7 +120,9 @@ class Planner:
         window = self._reference.window(station, self._reach(station, start.speed))
         choice = self._passing.step(window, offset, start.speed, predicted)
         if choice is None:
-            choice = self._lane_changer.step(window, offset, start.speed, predicted.objects)
+            angle = math.remainder(start.heading - float(window.headings[BEHIND]), 2.0 * math.pi)
+            lean = shape.front * math.sin(angle)
+            choice = self._lane_changer.step(window, offset, lean, start.speed, predicted.objects)
         if choice.keeping is not None:
             window = window.moved(choice.keeping.offsets, choice.keeping.begin, choice.keeping.width)
             offset -= float(choice.keeping.offsets[BEHIND])

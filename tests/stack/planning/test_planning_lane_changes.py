@@ -202,6 +202,27 @@ def test_a_change_is_broken_off_where_somebody_comes_abreast_in_the_next_lane(ah
     assert min(gaps) > 0.3
 
 
+@pytest.mark.parametrize("behind", [60.0, 90.0])
+def test_at_the_end_of_its_lane_a_change_is_not_given_up_where_it_would_stop_turned(behind: float) -> None:
+    """Who comes fast is seen when the front is over the marking; it could not begin again so near to the end."""
+    planner = Planner(PlanningConfig(), crossing_over(), SHAPE)
+    estimate, other, headings = believed(LATEST - 12.0 - SHAPE.front), None, []
+    for index in range(60):
+        time = 0.1 * index
+        if other is None and estimate.y + SHAPE.front * math.sin(estimate.heading) > 0.5 * WIDTH:
+            other = car(7, estimate.x - behind - 25.0 * time, WIDTH, speed=25.0)
+        points = planner.step(estimate, predicted([other] if other else [], time), {}).points
+        _, x, y, heading, speed, acceleration, curvature = points[1].tolist()
+        estimate = LocalizationEstimate(0.1 * (index + 1), x, y, heading, speed, acceleration, speed * curvature)
+        headings.append(heading)
+        if estimate.y > 0.8 * WIDTH:
+            break
+    assert other is not None
+    assert estimate.y > 0.8 * WIDTH
+    assert estimate.x + SHAPE.front < LATEST + SHAPE.length
+    assert min(headings) > -0.1
+
+
 @pytest.mark.parametrize("speed", [3.0, 4.0])
 @pytest.mark.parametrize("station", [110.0, 116.0])
 def test_while_it_waits_it_does_not_go_around_a_standing_car_on_the_lane_it_waits_for(
