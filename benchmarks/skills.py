@@ -78,6 +78,16 @@ SKILLS = {
         joined="ab_0>bc_1 ab_1>bc_2 rb_0>bc_0 bc_1>cd_0 bc_2>cd_1 cd_0>de_0 cd_0>de_1 cd_1>de_2 de_0>eq_0 de_1>ef_0 "
         "de_2>ef_1",
     ),
+    "short_ramp": Skill(
+        {**straight(0.0, 700.0, 800.0, 1600.0), "r": (400.0, -150.0)},
+        {
+            **dict.fromkeys(("ab", "cd"), 'speed="36.1" numLanes="3"'),
+            "bc": 'speed="36.1" numLanes="4"',
+            "rb": 'speed="22.2"',
+        },
+        flow("ab", "cd", 1.5) + flow("rb", "cd", 7.0),
+        joined="ab_0>bc_1 ab_1>bc_2 ab_2>bc_3 rb_0>bc_0 bc_1>cd_0 bc_2>cd_1 bc_3>cd_2",
+    ),
     "lane_ends": Skill(
         straight(0.0, 400.0, 800.0, 1200.0),
         {"ab": THREE, "bc": TWO, "cd": CITY},
