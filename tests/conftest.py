@@ -45,12 +45,17 @@ def _converted(folder: Path, nodes: str, edges: str, connections: str = "") -> P
     return folder / "net.xml"
 
 
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(autouse=True)
 def _interruptible() -> Iterator[None]:
-    """Workers of pytest-xdist and background jobs of a shell are born to ignore interrupts."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    """Workers of pytest-xdist and background jobs of a shell are born to ignore interrupts.
+
+    So does a command after the first one, which a test may have called in its own process.
+    """
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
-    signal.signal(signal.SIGINT, before)
+    for one, handler in before.items():
+        signal.signal(one, handler)
 
 
 @pytest.fixture(scope="session")
