@@ -8,6 +8,7 @@ from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.analysis.components import Verdict
 from dvca_sumo.analysis.dtest import Probe
 from dvca_sumo.interventions import UNITS
+from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.record import MessageMark, Record
 from dvca_sumo.report.result import Timing
 from dvca_sumo.responsibility.judging import AtFault, Judged
@@ -66,7 +67,7 @@ def _what_happened(violation: Violation, found: Attribution) -> Iterator[str]:
     yield f"  what     {violation.detail}"
     if violation.contact is not None:
         yield f"  contact  {violation.contact.value.replace('_', ' ')}: {_CONTACTS[violation.contact]}"
-    yield from _whose(found.judged(violation))
+    yield from _whose(violation, found.judged(violation))
     others = [one for one in record.violations if one is not violation]
     if others:
         listed = ", ".join(f"{one.kind.replace('_', ' ')} at {one.time:.1f} s" for one in others[:4])
@@ -74,11 +75,11 @@ def _what_happened(violation: Violation, found: Attribution) -> Iterator[str]:
     yield from _stops(record)
 
 
-def _whose(judged: Judged | None) -> Iterator[str]:
-    """Unless it is the ego's own."""
-    if judged is None:
+def _whose(violation: Violation, judged: Judged | None) -> Iterator[str]:
+    """Unless it is the ego's own, or nobody has asked: an attribution was interrupted before."""
+    if violation.kind == Destination.not_reached:
         yield "  doing    not known: it takes SUMO's own driver on the same trip, as `dvca-sumo screen` has it"
-    elif judged.fault is not AtFault.DRIVER:
+    elif judged is not None and judged.fault is not AtFault.DRIVER:
         yield f"  doing    {_WHOSE[judged.fault]}: {judged.reason}"
         yield "           what follows is what would have avoided it all the same"
 

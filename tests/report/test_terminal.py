@@ -23,7 +23,7 @@ from analysis.scenes import (
 )
 from msgspec.structs import replace
 
-from dvca_sumo.analysis.attribution import Attribution
+from dvca_sumo.analysis.attribution import Attribution, unexplained
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.messages import Component
 from dvca_sumo.oracles.destination import Destination
@@ -80,6 +80,7 @@ def test_whose_doing_it_is_stands_there_unless_it_is_the_egos(violation: Violati
     record = faulty_drive(violation)
     assert says in line(text(attributed(record, answering(record, {PERCEPTION: FATAL}))), "doing")
     assert "doing" not in text(explained())
+    assert "doing" not in text(unexplained(faulty_drive(HIT)))  # interrupted before anybody asked
 
 
 def test_a_run_that_could_not_be_judged_is_not_called_clean() -> None:
