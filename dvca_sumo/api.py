@@ -13,7 +13,6 @@ import msgspec
 
 from dvca_sumo.analysis.attribution import (
     Attribution,
-    AttributionStoppedError,
     Progress,
     Request,
     explain,
@@ -105,8 +104,6 @@ def attribute(drive: FactualDrive, progress: Progress | None = None, *, certify:
         witness = drive.engine.witness if certify else None
         progress, from_start = progress or Progress(), _is_copied(drive)
         return explain(drive.engine, drive.request, drive.record, progress, witness, from_start=from_start)
-    except KeyboardInterrupt:
-        raise AttributionStoppedError(unattributed(drive)) from None
     finally:
         drive.engine.close()
 

@@ -8,12 +8,17 @@ import msgspec
 
 from dvca_sumo.messages import Floats, Integers, SignalColour, VehicleShape
 
-_DRAWN = "polygon:"
+DRAWN = "polygon:"  # before the names of what is drawn as an area or a line
+
+
+def part_of(name: str, number: int) -> str:
+    """The id of one of several parts of a drawn thing."""
+    return f"{name}#{number}"
 
 
 def whole(name: str) -> str:
     """The id of a drawn thing, of that of one of its parts; of everything else it is the same."""
-    return name.rpartition("#")[0] if name.startswith(_DRAWN) and "#" in name else name
+    return name.rpartition("#")[0] if name.startswith(DRAWN) and "#" in name else name
 
 
 class EgoTruth(msgspec.Struct, frozen=True, gc=False):

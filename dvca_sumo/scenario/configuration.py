@@ -66,8 +66,6 @@ OUTPUTS = frozenset(
 
 # With these SUMO writes a file about its options and leaves.
 _LEAVES = ("save-configuration", "save-template", "save-schema")
-
-
 _VARIABLE = re.compile(r"\$\{([^}]+)\}")
 
 

@@ -17,6 +17,7 @@ from dvca_sumo.stack.planning.lane_gaps import LAST_SPEED, Gaps, Neighbours, Urg
 from dvca_sumo.stack.planning.moves import Lateral, Move, blend_length, moved
 from dvca_sumo.stack.planning.reference import BEHIND, Window
 from dvca_sumo.stack.planning.speed import Stop
+from dvca_sumo.stack.planning.start import StartState
 
 ARRIVED = 0.4  # [m] from the lane's centre
 _OVER = 0.2  # [m] of the body over the marking, from which on going on is safer than going back
@@ -55,11 +56,8 @@ class LaneChanger:
         self._lane = 0  # of its lanes, the one the ego is on
         self._target = 0  # of its lanes, the one the ego is to be on
 
-    def step(self, window: Window, offset: float, lean: float, speed: float, objects: TrackedObjects) -> LaneChoice:
-        """The lane for a cycle in which the rear axle is at the window's origin, `offset` [m] beside its line.
-
-        The front is `lean` [m] farther to the left.
-        """
+    def step(self, window: Window, offset: float, start: StartState, objects: TrackedObjects) -> LaneChoice:
+        """The lane for a cycle in which the rear axle is at the window's origin, `offset` [m] beside its line."""
         nose = window.station + self._shape.front
         while self._next < len(self._changes) and nose >= self._changes[self._next].latest_station:
             self._next, self._lane, self._target = self._next + 1, 0, 0
@@ -71,13 +69,13 @@ class LaneChanger:
         here = change.centres(np.array([window.station]))[:, 0]
         if nose > change.start_station and abs(offset - here[self._target]) < ARRIVED:
             self._lane = self._target
-        return self._choice(change, window, offset - float(here[self._lane]), lean, speed, objects)
+        return self._choice(change, window, offset - float(here[self._lane]), start, objects)
 
     def _choice(
-        self, change: LaneChange, window: Window, aside: float, lean: float, speed: float, objects: TrackedObjects
+        self, change: LaneChange, window: Window, aside: float, start: StartState, objects: TrackedObjects
     ) -> LaneChoice:
-        """`aside` [m] is how far the ego is from its lane's centre, its front by `lean` farther."""
-        last = len(change.lanes) - 1
+        """`aside` [m] is how far the ego is from its lane's centre."""
+        last, speed = len(change.lanes) - 1, start.speed
         if self._lane == last:
             return LaneChoice()
         stop = last_stop(change, window, last - self._lane, speed, self._shape, self._config)
@@ -96,7 +94,7 @@ class LaneChanger:
             target += 1
         width, beside = change.widths[self._lane], occupied[self._lane + 1]
         if target < self._target and (
-            goes_on(self._out(aside, lean, stop, speed), width, beside, self._shape)
+            goes_on(self._out(aside, window, start, stop), width, beside, self._shape)
             or is_caught(occupied[self._lane], beside, speed, self._shape, self._config)
         ):
             target = self._target
@@ -107,13 +105,13 @@ class LaneChanger:
         pace = self._gaps.pace(occupied[target + 1], change, window, speed)
         return LaneChoice(keeping(change, target, window, speed, stop, self._config), behind, pace)
 
-    def _out(self, aside: float, lean: float, stop: Stop, speed: float) -> float:
+    def _out(self, aside: float, window: Window, start: StartState, stop: Stop) -> float:
         """How far out of its lane an ego is that is to give up a change [m]: its front, where there is no way back.
 
         It would stop there turned, and too near to the end of the lane to begin again.
         """
-        front = aside + lean
-        return front if blend_length(front, speed, self._config) > stop.at else aside
+        front = aside + self._shape.front * math.sin(start.heading - float(window.headings[BEHIND]))
+        return front if blend_length(front, start.speed, self._config) > stop.at else aside
 
 
 def keeping(

@@ -120,9 +120,7 @@ class Planner:
         window = self._reference.window(station, self._reach(station, start.speed))
         choice = self._passing.step(window, offset, start.speed, predicted)
         if choice is None:
-            angle = math.remainder(start.heading - float(window.headings[BEHIND]), 2.0 * math.pi)
-            lean = shape.front * math.sin(angle)
-            choice = self._lane_changer.step(window, offset, lean, start.speed, predicted.objects)
+            choice = self._lane_changer.step(window, offset, start, predicted.objects)
         if choice.keeping is not None:
             window = window.moved(choice.keeping.offsets, choice.keeping.begin, choice.keeping.width)
             offset -= float(choice.keeping.offsets[BEHIND])

@@ -5,6 +5,7 @@ import math
 import libsumo
 import numpy as np
 
+from dvca_sumo.truth import DRAWN, part_of
 from dvca_sumo.world.obstacles import Obstacles, box_of_poi, boxes_of_polygon
 
 OBSTACLE = "obstacle."  # POIs and polygons whose type starts so are bodies, all others are scenery
@@ -24,6 +25,7 @@ def obstacles() -> Obstacles:
         shape_of = libsumo.polygon
         if shape_of.getType(name).startswith(OBSTACLE):
             boxes = boxes_of_polygon(shape_of.getShape(name), shape_of.getFilled(name), shape_of.getLineWidth(name))
-            names += [f"polygon:{name}" if len(boxes) == 1 else f"polygon:{name}#{part}" for part in range(len(boxes))]
+            whole = f"{DRAWN}{name}"
+            names += [whole] if len(boxes) == 1 else [part_of(whole, number) for number in range(len(boxes))]
             rows += boxes
     return Obstacles(tuple(names), np.array(rows, dtype=np.float64).reshape(-1, 5))
