@@ -20,19 +20,19 @@ from dvca_sumo.analysis.components import (
     undecided,
 )
 from dvca_sumo.analysis.differences import Difference, differences
-from dvca_sumo.analysis.dtest import Dtest, Probe, Question, Setting, could_not_tell
+from dvca_sumo.analysis.dtest import Dtest, Probe, Setting, could_not_tell
 from dvca_sumo.analysis.last_chance import UndecidedError, decisive, is_by_luck
 from dvca_sumo.analysis.messages import MessageAnswer
+from dvca_sumo.analysis.premise import why_not_reproduced
 from dvca_sumo.analysis.specification import PlanningFinding, first_unusable_plan, first_violating_plan
 from dvca_sumo.analysis.violating import principal
-from dvca_sumo.engine.protocol import Engine, RunFailedError
+from dvca_sumo.engine.protocol import Engine
 from dvca_sumo.interventions import Fault, recorded_futures
 from dvca_sumo.messages import PREDICTION_TIMES, Component, MessageId
 from dvca_sumo.record import TICK, MessageMark, Record
 from dvca_sumo.responsibility.judging import Judged
 from dvca_sumo.run import StopRule, Task
-from dvca_sumo.scenario import Scenario, ScenarioError
-from dvca_sumo.stack.reference import StackError
+from dvca_sumo.scenario import Scenario
 from dvca_sumo.violations import Answer, Category, Violation
 
 # A counterfactual run is safe without any violation until so long after the factual one ...
@@ -215,7 +215,7 @@ def _steps(
 ) -> Iterator[Attribution]:
     """The answer after each step of Algorithm 1."""
     assert found.violation is not None  # or there would be nothing to explain
-    doubt = _premise(engine, dtest, _factual_task(request), found, from_start=from_start)
+    doubt = why_not_reproduced(engine, dtest, _factual_task(request), found.record, from_start=from_start)
     if doubt:
         yield replace(found, verdict=Verdict.NOT_REPRODUCIBLE, is_reproducible=False, reason=doubt)
         return
@@ -226,37 +226,6 @@ def _steps(
         yield _planning_message(found, engine)
     elif answer.verdict is Verdict.COMPONENT:
         yield _decided(found, dtest, engine, is_exact=request.repeats is None)
-
-
-def _premise(engine: Engine, dtest: Dtest, factual: Task, found: Attribution, *, from_start: bool) -> str:
-    """Why the violation does not reproduce; empty when it does."""
-    outcome = dtest.ask(Question(()))
-    if outcome is not Outcome.VIOLATES and factual.jitter is not None:
-        return f"most re-runs do not violate: {outcome}"
-    probe = dtest.probes[0]
-    if outcome is Outcome.UNRESOLVED:
-        return f"the repeated run could not be told: {probe.reason}"
-    digests = found.record.digests
-    is_at_once = probe.steps == 0 and outcome is Outcome.VIOLATES  # at the departure: nothing was driven before
-    is_same = is_at_once or (probe.steps > 0 and digests[probe.steps - 1 : probe.steps] == [probe.last_step])
-    if is_same and outcome is Outcome.SAFE:
-        return f"the repeated run is the same, but shows no violation until {found.until:.1f} s"
-    if factual.jitter is not None or (is_same and not from_start):
-        return ""
-    return _differing(engine, factual, found.record, is_known=not is_same)
-
-
-def _differing(engine: Engine, factual: Task, record: Record, *, is_known: bool) -> str:
-    """Where one more run of the factual task differs; empty where it does not, unless another is known to."""
-    try:
-        again = engine.record(factual).digests
-    except (ScenarioError, StackError, RunFailedError) as error:
-        return f"{'the repeated run differs, and ' if is_known else ''}one more run failed: {error}"
-    if again == record.digests:
-        return "the repeated run differs, one more does not" if is_known else ""
-    pairs = enumerate(zip(record.digests, again, strict=False))
-    same = next((step for step, pair in pairs if len({*pair}) > 1), len(again))
-    return f"the repeated run differs: first at {record.start + 0.1 * same:.1f} s"
 
 
 def _planning_message(found: Attribution, engine: Engine) -> Attribution:

@@ -78,6 +78,11 @@ class Dtest:
         """Of the factual run."""
         return self._setting.futures
 
+    @property
+    def until(self) -> float:
+        """A probe without a violation up to there is safe [s]."""
+        return self._setting.stop.at
+
     def ask(self, question: Question) -> Outcome:
         """The outcome of one question; asked before, it costs nothing."""
         return self.ask_all([question])[0]
