@@ -22,6 +22,7 @@ _NEVER = 1e4  # [m] for places where there is no leader
 _LANE_ROOM = 0.3  # [m] of lane beside the ego's width that is enough for `trusts_lane_room`
 _OFF_LANE = 0.5  # [m] of the body beyond the edge of its lane, by the line, not by what it swerves for
 _GRAZING = 0.6  # [m] of overlap of who moves and the body, up to which the outline is looked at
+_BACK = 15.0  # [m] along the line in one step of a prediction: farther than anybody comes who drives towards the ego
 
 
 class Graph(msgspec.Struct, frozen=True, eq=False):
@@ -39,6 +40,7 @@ class Graph(msgspec.Struct, frozen=True, eq=False):
     ends: Floats  # (h, t) [m] as `high`, but of the same
     first: list[int]  # (h,) column in which occupation begins; 0 where there is none
     last: list[int]  # (h,) column in which it ends
+    returning: frozenset[int]  # rows of those who are on the path farther on, and come to it again, nearer, by then
     rear_overhang: float  # [m] of the ego
 
     def track(self, row: int) -> int:
@@ -111,10 +113,24 @@ def graph_of(
         occupied[grazing] = (nearest < margins[grazing[0]]) & is_ahead
     if config.trusts_lane_room:
         occupied[still][_has_lane_room(scene, window, shape)] = False
+    returning = _let_return(occupied[: scene.moving], futures.stations[: scene.moving])
     last = occupied.shape[1] - 1 - occupied[:, ::-1].argmax(axis=1)
     first = occupied.argmax(axis=1).tolist()
     return Graph(
-        window, path, scene, occupied, margins, gaps, low, high, begins, ends, first, last.tolist(), shape.rear_overhang
+        window=window,
+        path=path,
+        scene=scene,
+        occupied=occupied,
+        margins=margins,
+        gaps=gaps,
+        low=low,
+        high=high,
+        begins=begins,
+        ends=ends,
+        first=first,
+        last=last.tolist(),
+        returning=returning,
+        rear_overhang=shape.rear_overhang,
     )
 
 
@@ -184,6 +200,25 @@ def _let_leave(occupied: Flags, scene: Scene, gaps: Floats, config: PlanningConf
         occupied[people] &= ~(leaves & (gaps >= config.person_margin))
 
 
+def _let_return(occupied: Flags, stations: Floats) -> frozenset[int]:
+    """Free the path of those who leave it for a place nearer to the ego, up to then; which they are.
+
+    Round a roundabout the path comes by again where somebody drives who will soon pass the entry. It is there that the
+    ego meets that one, who has left the other place when it may be there.
+    """
+    jumps = stations[:, 1:] < stations[:, :-1] - _BACK
+    if not np.count_nonzero(jumps):
+        return frozenset()
+    returning = []
+    for row in np.count_nonzero(jumps, axis=1).nonzero()[0].tolist():
+        for back in reversed((jumps[row].nonzero()[0] + 1).tolist()):
+            if occupied[row, :back].any() and occupied[row, back:].any():
+                occupied[row, :back] = False
+                returning.append(row)
+                break
+    return frozenset(returning)
+
+
 def leading(
     graph: Graph, lanes: frozenset[str], shape: VehicleShape, config: PlanningConfig
 ) -> tuple[list[int], list[int]]:
@@ -224,7 +259,7 @@ def _leads(row: int, graph: Graph, lanes: frozenset[str], shape: VehicleShape, c
     is_beside = graph.low[row, 0] < shape.front and (scene.is_person[row] or futures.directions[row, 0] < -ALONG)
     if is_beside or abs(futures.directions[row, first]) < ALONG:
         return False
-    if futures.stations[row, 0] > shape.centre:
+    if futures.stations[row, 0] > shape.centre and row not in graph.returning:
         return bool(scene.times[first] <= PRESENT) and not _leaves_oncoming(row, graph, shape)
     aslant = futures.half_widths[row, : first + 1] - 0.5 * scene.boxes[scene.owners[row], 4]  # wider than it is
     is_along = futures.directions[row, 0] > ALONG

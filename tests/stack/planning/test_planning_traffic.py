@@ -23,7 +23,7 @@ from planned_drives import (
 )
 
 from dvca_sumo.geometry.polyline import Polyline
-from dvca_sumo.messages import PREDICTION_TIMES, ObjectClass, SignalColour
+from dvca_sumo.messages import PREDICTION_TIMES, Floats, ObjectClass, SignalColour
 from dvca_sumo.roadmap.route import Control, Crossing, Overpass, Route
 from dvca_sumo.stack.planning import Planner, PlanningConfig
 
@@ -513,6 +513,29 @@ def test_who_drives_along_on_the_inner_lane_of_a_roundabout_is_no_reason_to_slow
     planner = Planner(PlanningConfig(), road(line, stop_lines=[stop_line(45.0, Control.YIELD)]), SHAPE)
     trajectory = planner.step(believed(427.6, 521.7, heading=0.36, speed=7.7), future, {})
     assert trajectory.decision == "cruise"
+
+
+def round_a_roundabout(radius: float) -> Floats:
+    """80 m straight on, the upper half of a ring to the left, from its lowest to its highest point, straight back."""
+    stations = np.arange(0.0, 80.0 + math.pi * radius + 60.5)
+    return bent_points(np.where((stations >= 80.0) & (stations < 80.0 + math.pi * radius), 1.0 / radius, 0.0))
+
+
+@pytest.mark.parametrize(("round_ring", "station"), [(0.7, 25.0), (0.8, 35.0), (0.85, 35.0)])
+def test_who_drives_where_the_ego_will_leave_a_roundabout_and_passes_its_entry_before_is_yielded_to(
+    round_ring: float, station: float
+) -> None:
+    """It is on the ego's way, far ahead, and would lead it there; but where they meet is the entry."""
+    radius = 14.0
+    angles = np.arange(0.0, 3.0 * math.pi, 0.05) + (round_ring - 0.5) * math.pi
+    ring = Polyline(radius * np.column_stack([np.cos(angles), np.sin(angles)]) + np.array([80.0, radius]))
+    other = Winding(3, ObjectClass.VEHICLE, 0.0, 0.0, speed=8.0, lanes=("major_0", "ego_0"), line=ring)
+    route = road(round_a_roundabout(radius), stop_lines=[stop_line(70.0, Control.YIELD)])
+    driven = drive(route, 25.0, speed=8.0, station=station, actors=[other])
+    assert driven.decisions[0] == "yield 3"
+    assert driven.clearances.min() > 2.0
+    assert driven.states[:, 5].min() > -3.0
+    assert_drivable(driven)
 
 
 @pytest.mark.parametrize(("speed", "x"), [(0.0, 105.0), (1.0, 105.4), (2.0, 105.8), (2.0, 106.2)])
