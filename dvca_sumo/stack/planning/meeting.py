@@ -246,12 +246,16 @@ class Meetings:
         return bool(graph.scene.futures.directions[row, last] > ALONG and last > first + _STAYS)
 
     def _stop(self, row: int, graph: Graph, views: list[LineView]) -> Stop:
-        """Before the other's way until it is clear; on a junction of `views` at its place, if that is still ahead."""
+        """Before the other's way until it is clear; on a junction of `views` at its place, if that is still ahead.
+
+        Behind who turns into its way there, the ego comes with the room that it leaves a leader.
+        """
         config, front = self._config, self._shape.front
         first, last, scene = graph.first[row], graph.last[row], graph.scene
         is_person = scene.is_person[row]
         gap = config.person_gap if is_person else config.yield_gap
-        if self._joins(row, graph):
+        joins = self._joins(row, graph)
+        if joins:
             nearest, until = float(graph.low[row, first]), float(scene.times[first])
         else:
             # Who drives along beside comes into the way with its nose, or one corner; who crosses, as wide as it is.
@@ -264,10 +268,11 @@ class Meetings:
             nearest, touching = graph.contacts(row)
             if nearest <= front and not is_person and touching < graph.path.arcs[-1]:
                 nearest = touching  # it passes close beside the ego, then touches it further on
-        at = nearest - gap - front
-        for view in views:
-            if view.distance - 1.0 <= nearest - front <= view.exit_distance and view.may_wait:
-                at = min(at, view.waiting_distance)
+        met_on = [view for view in views if view.distance - 1.0 <= nearest - front <= view.exit_distance]
+        if joins and met_on:
+            gap = config.follow_gap
+        waiting = [view.waiting_distance for view in met_on if view.may_wait]
+        at = min([nearest - gap - front, *waiting])
         return Stop(at, nearest - HARD_GAP - front - at, f"yield {graph.track(row)}", until)
 
 

@@ -521,19 +521,35 @@ def round_a_roundabout(radius: float) -> Floats:
     return bent_points(np.where((stations >= 80.0) & (stations < 80.0 + math.pi * radius), 1.0 / radius, 0.0))
 
 
-@pytest.mark.parametrize(("round_ring", "station"), [(0.7, 25.0), (0.8, 35.0), (0.85, 35.0)])
-def test_who_drives_where_the_ego_will_leave_a_roundabout_and_passes_its_entry_before_is_yielded_to(
-    round_ring: float, station: float
-) -> None:
-    """It is on the ego's way, far ahead, and would lead it there; but where they meet is the entry."""
+def past_a_roundabout(round_ring: float, station: float) -> Drive:
+    """From `station` on, past who drives round it, so far past the lowest point [of half the ring]."""
     radius = 14.0
     angles = np.arange(0.0, 3.0 * math.pi, 0.05) + (round_ring - 0.5) * math.pi
     ring = Polyline(radius * np.column_stack([np.cos(angles), np.sin(angles)]) + np.array([80.0, radius]))
     other = Winding(3, ObjectClass.VEHICLE, 0.0, 0.0, speed=8.0, lanes=("major_0", "ego_0"), line=ring)
     route = road(round_a_roundabout(radius), stop_lines=[stop_line(70.0, Control.YIELD)])
-    driven = drive(route, 25.0, speed=8.0, station=station, actors=[other])
+    return drive(route, 25.0, speed=8.0, station=station, actors=[other])
+
+
+@pytest.mark.parametrize(("round_ring", "station"), [(0.7, 25.0), (0.8, 35.0), (0.85, 35.0)])
+def test_who_drives_where_the_ego_will_leave_a_roundabout_and_passes_its_entry_before_is_yielded_to(
+    round_ring: float, station: float
+) -> None:
+    """It is on the ego's way, far ahead, and would lead it there; but where they meet is the entry."""
+    driven = past_a_roundabout(round_ring, station)
     assert driven.decisions[0] == "yield 3"
     assert driven.clearances.min() > 2.0
+    assert driven.states[:, 5].min() > -3.0
+    assert_drivable(driven)
+
+
+@pytest.mark.parametrize(("round_ring", "station"), [(0.6, 5.0), (0.8, 15.0), (0.95, 25.0)])
+def test_behind_who_passes_the_entry_of_a_roundabout_the_ego_enters_with_room_to_follow(
+    round_ring: float, station: float
+) -> None:
+    """It would come close to its tail, faster, and brake hard for it."""
+    driven = past_a_roundabout(round_ring, station)
+    assert driven.clearances.min() > 3.0
     assert driven.states[:, 5].min() > -3.0
     assert_drivable(driven)
 
