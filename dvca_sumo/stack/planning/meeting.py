@@ -133,12 +133,14 @@ class Meetings:
     def _beside(self, row: int, entry: float, graph: Graph, profile: Profile) -> float:
         """How far behind the front bumper somebody may come to the ego's way, at `entry` [s], and standing helps [m].
 
-        An ego that hardly moves does not get away from a vehicle any more; standing, it is seen and driven around.
+        An ego that is slow does not get away from a vehicle any more; standing, it is seen and driven around. Past who
+        is beside it already, it is no sooner when it stops.
         """
         config, scene, speed = self._config, graph.scene, float(profile.speeds[0])
         if not scene.is_person[row]:
-            is_met = entry < config.soon and scene.probabilities[row] >= config.likely
-            is_caught = is_met and speed < config.standing_speed and not self._passes([row], graph, profile, 0.0)[0]
+            slow = config.creeping_speed if entry > PRESENT else config.standing_speed
+            is_met = scene.probabilities[row] >= config.likely and speed < slow
+            is_caught = is_met and not self._passes([row], graph, profile, 0.0)[0]
             return self._shape.length if is_caught else 0.0
         if speed >= _SLOW:
             return 0.0

@@ -575,6 +575,19 @@ def test_a_slow_ego_in_the_way_of_a_bus_that_comes_stands(x: float, crawls: floa
     assert driven.speeds[touched].max() < 0.1
 
 
+@pytest.mark.parametrize("arrives", [1.0, 1.75])
+@pytest.mark.parametrize("crawls", [0.8, 1.3])
+def test_a_creeping_ego_stops_before_somebody_with_priority_comes_into_whose_way_it_has_got(
+    arrives: float, crawls: float
+) -> None:
+    coming = car(3, 105.6, -8.0 * arrives - 3.4, heading=UP, speed=8.0, lanes=("major_0",))
+    junction = stop_line(98.0, Control.YIELD)
+    driven = drive(road(stop_lines=[junction]), 8.0, station=101.0, speed=crawls, actors=[coming])
+    assert driven.decisions[0] == "yield 3"
+    assert driven.speeds[driven.clearances < 0.5].max() < 0.1
+    assert driven.fronts[-1] > 115.0
+
+
 @pytest.mark.parametrize("speed", [5.0, 14.0])
 def test_a_standing_ego_does_not_start_towards_who_comes_past_it_with_hardly_room(speed: float) -> None:
     driven = drive(
