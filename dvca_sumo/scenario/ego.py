@@ -66,7 +66,8 @@ class Definitions:
         for path, text in texts_within((*configuration.routes, *configuration.additionals)):
             for match in _VEHICLE.finditer(text):
                 tags = self._flows if match.group(1) == "flow" else self._tags
-                tags.setdefault(match.group(2), text[match.start() : text.index(">", match.start())])
+                end = text.find(">", match.start())
+                tags.setdefault(match.group(2), text[match.start() : end if end >= 0 else None])
             self.parameters += parameters_within(text, path)
             signed.update(*map(str.split, _SIGN.findall(text)))
         self.signed_lanes = frozenset(signed)  # under variable speed signs

@@ -72,6 +72,10 @@ BROKEN = {
     "net that is none": Broken(("not a SUMO net", "net.net.xml"), _replaced("net.net.xml", "<routes/>")),
     "no route file": Broken(("route-files", "routes.rou.xml", "does not exist"), _removed("routes.rou.xml")),
     "route file cut off": Broken(("routes.rou.xml", "At line/column"), _truncated("routes.rou.xml")),
+    "route file cut off within a vehicle": Broken(
+        ("routes.rou.xml", "At line/column"),
+        lambda folder: (folder / "routes.rou.xml").write_text(f"<routes>{EGO[: EGO.index('from=')]}", encoding="utf-8"),
+    ),
     "route over an unknown edge": Broken(("'zz'", "not known"), routes=EGO.replace('to="bc"', 'to="zz"')),
     "route with a gap": Broken(
         ("'ego' has no valid route",), routes='<vehicle id="ego" depart="0"><route edges="ab nb"/></vehicle>'
