@@ -17,13 +17,13 @@ from dvca_sumo.analysis.attribution import (
     Request,
     explain,
     factual_run,
-    unexplained,
+    unasked,
 )
 from dvca_sumo.engine.fork import IS_AVAILABLE, ForkEngine
 from dvca_sumo.engine.protocol import Engine
 from dvca_sumo.engine.replay import ReplayEngine
 from dvca_sumo.installation import scenario_path
-from dvca_sumo.interventions import planted_fault
+from dvca_sumo.interventions import assert_met, planted_fault
 from dvca_sumo.record import Record
 from dvca_sumo.scenario import Scenario
 from dvca_sumo.scenario import load_scenario as _load_scenario
@@ -86,10 +86,14 @@ def drive(
     source = StackSource(stack, bug)
     chosen = ENGINES[engine or DEFAULT_ENGINE](scenario.configuration.net, source, jobs)
     try:
-        return FactualDrive(request, chosen, factual_run(chosen, request), source)
+        record = factual_run(chosen, request)
+        met = {name for moment in record.moments for name in moment.objects.ids}
+        for fault in request.faults:
+            assert_met(fault, met)
     except BaseException:
         chosen.close()
         raise
+    return FactualDrive(request, chosen, record, source)
 
 
 def attribute(drive: FactualDrive, progress: Progress | None = None, *, certify: bool = False) -> Attribution:
@@ -110,7 +114,7 @@ def attribute(drive: FactualDrive, progress: Progress | None = None, *, certify:
 
 def unattributed(drive: FactualDrive) -> Attribution:
     """What a drive shows by itself, when its attribution is interrupted before it begins."""
-    return msgspec.structs.replace(unexplained(drive.record), reason="interrupted")
+    return unasked(drive.request, drive.record)
 
 
 def _is_copied(drive: FactualDrive) -> bool:

@@ -5,7 +5,7 @@ import msgspec
 from dvca_sumo.interventions.effects import EFFECTS
 from dvca_sumo.interventions.entries import FaultError, FaultType, Parameter
 from dvca_sumo.interventions.futures import Futures, Track, recorded_futures
-from dvca_sumo.interventions.library import COMMON, Fault, fault_library, planted_fault
+from dvca_sumo.interventions.library import COMMON, Fault, assert_met, fault_library, planted_fault
 from dvca_sumo.interventions.selection import Gate, Occasion, Selection
 from dvca_sumo.interventions.states import UNITS, State, StateUnits, state_of
 from dvca_sumo.messages import Component
@@ -27,6 +27,7 @@ __all__ = [
     "State",
     "StateUnits",
     "Track",
+    "assert_met",
     "fault_library",
     "planted_fault",
     "recorded_futures",

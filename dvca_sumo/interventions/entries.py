@@ -67,9 +67,13 @@ def allowed_range(parameter: Parameter) -> str:
 
 def choice(name: str, known: Collection[str]) -> str:
     """What may stand in the place of a word that is unknown, and which of it comes nearest."""
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.4)
-    hint = f"; did you mean {close[0]!r}?" if close else ""
-    return f" (allowed: {', '.join(known) or 'none'}){hint}"
+    return f" (allowed: {', '.join(known) or 'none'}){nearest(name, known)}"
+
+
+def nearest(name: str, known: Collection[str]) -> str:
+    """The word that comes nearest to an unknown one, as a question; empty where none does."""
+    close = difflib.get_close_matches(name, sorted(known), n=1, cutoff=0.4)
+    return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def _refuse_unknown(where: str, written: dict[str, Any]) -> None:

@@ -1,14 +1,16 @@
 """The fault library: one TOML file an entry, and the command-line words that plant one."""
 
 import math
+from collections.abc import Iterable
 from functools import cache
 
 import msgspec
 
 from dvca_sumo.installation import folder
-from dvca_sumo.interventions.entries import FaultError, FaultType, Parameter, allowed_range, choice, read_entry
+from dvca_sumo.interventions.entries import FaultError, FaultType, Parameter, allowed_range, choice, nearest, read_entry
 from dvca_sumo.interventions.selection import Selection
 from dvca_sumo.interventions.states import State
+from dvca_sumo.interventions.targets import ALL, IN_WAY, words_for
 from dvca_sumo.messages import Component
 
 
@@ -49,21 +51,21 @@ def planted_fault(text: str) -> Fault:
         FaultError: Unknown name or parameter (the nearest is suggested), one given twice, or a value of the
             wrong type or outside the allowed range (both are named).
     """
-    name, _, rest = text.partition(":")
+    name, separator, rest = text.partition(":")
     entry = fault_library().get(name)
     if entry is None:
         raise FaultError(f"unknown fault {name!r}{choice(name, fault_library())}")
     known = {**entry.parameters, **COMMON}
     values: dict[str, float | str] = {key: parameter.default for key, parameter in known.items()}
     given = set[str]()
-    for word in filter(None, rest.split(",")):
-        key, separator, value = word.partition("=")
+    for word in rest.split(",") if separator else ():
+        key, is_given, value = word.partition("=")
         if key not in known:
             raise FaultError(f"fault {name} takes no parameter {key!r}{choice(key, known)}")
         if key in given:
             raise FaultError(f"fault {name}: parameter {key} is given twice")
         given.add(key)
-        if not separator:
+        if not is_given:
             raise FaultError(f"fault {name}: parameter {key} has no value (write {key}=...)")
         values[key] = _value(name, key, known[key], value)
     for low, high in (("start", "end"), ("first", "last")):
@@ -76,6 +78,19 @@ def planted_fault(text: str) -> Fault:
         parameters={key: values[key] for key in entry.parameters},
         selection=_selection(values),
     )
+
+
+def assert_met(fault: Fault, ids: Iterable[str]) -> None:
+    """Check that the object that a fault is about is one of those, whose `ids` these are, that the ego came across.
+
+    Raises:
+        FaultError: It is none of theirs; the nearest is suggested.
+    """
+    which = str(fault.parameters.get("object", ALL))
+    known = {word for one in ids for word in words_for(one) if word}
+    if which not in known | {ALL, IN_WAY}:
+        allowed = f"(allowed: the id of one that does, {IN_WAY}, {ALL}){nearest(which, known)}"
+        raise FaultError(f"fault {fault.name}: no object {which!r} comes near the ego {allowed}")
 
 
 def _selection(values: dict[str, float | str]) -> Selection:
@@ -107,6 +122,6 @@ def _value(fault: str, key: str, parameter: Parameter, text: str) -> float | str
         raise FaultError(f"{where} is no number: {text!r} ({allowed})") from None
     if not parameter.low <= number <= parameter.high:
         raise FaultError(f"{where} is out of range: {text} ({allowed})")
-    if parameter.kind == "index" and not number.is_integer():
+    if parameter.kind == "index" and not number.is_integer() and number != parameter.default:
         raise FaultError(f"{where} is no whole number: {text} ({allowed})")
     return number

@@ -85,7 +85,16 @@ def _half_widths(objects: ObjectsTruth, headings: Floats, rows: Integers) -> Flo
     return found
 
 
+def words_for(known: str) -> tuple[str, ...]:
+    """What an object of that id may be called."""
+    return *_words(known), *_words(whole(known))
+
+
 def _rows_by_id(name: str, ids: tuple[str, ...]) -> list[int]:
-    names = ((known, known.partition(":")[2]) for known in ids)
-    found = [row for row, those in enumerate(names) if name in those]
-    return found or [row for row, known in enumerate(ids) if name in (whole(known), whole(known).partition(":")[2])]
+    found = [row for row, known in enumerate(ids) if name in _words(known)]
+    return found or [row for row, known in enumerate(ids) if name in _words(whole(known))]
+
+
+def _words(known: str) -> tuple[str, str]:
+    """What an object may be called: its id, or that without its kind."""
+    return known, known.partition(":")[2]

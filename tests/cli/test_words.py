@@ -32,6 +32,9 @@ BAD_FAULTS = {
     "planning.path:start=9,end=5": ("end=5", "before start=9"),
     "planning.path:first=9,last=5": ("last=5", "before first=9"),
     "planning.path:first=1.5": ("parameter first is no whole number: 1.5",),
+    "planning.path:first=inf": ("parameter first is no whole number: inf",),
+    "planning.path:": ("takes no parameter ''",),
+    "perception.miss:object=pedestrain": ("no object 'pedestrain' comes near", "did you mean 'pedestrian'?", "in_way"),
     "planning.path:start=8,start=9": ("parameter start is given twice",),
     "planning.path:state=1:2": ("parameter state is no state: '1:2'", "p:v:a"),
 }

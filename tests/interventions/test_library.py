@@ -111,6 +111,10 @@ def test_a_parameter_of_another_fault_is_unknown() -> None:
     assert "'error'" in refusal("perception.miss:error=1")
 
 
+def test_a_default_may_be_written() -> None:
+    assert planted_fault("perception.miss:last=inf,end=inf") == planted_fault("perception.miss")
+
+
 def test_a_parameter_without_a_value_is_told_to_have_one() -> None:
     said = refusal("perception.miss:object")
     assert "object" in said
