@@ -1,7 +1,7 @@
 """Attribution of a driving violation: Algorithm 1 with its premise, every step kept as evidence."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import msgspec
 from msgspec.structs import replace
@@ -23,12 +23,13 @@ from dvca_sumo.analysis.differences import Difference, differences
 from dvca_sumo.analysis.dtest import Dtest, Probe, Setting, could_not_tell
 from dvca_sumo.analysis.last_chance import UndecidedError, decisive, is_by_luck
 from dvca_sumo.analysis.messages import MessageAnswer
+from dvca_sumo.analysis.planted import Planted, planted
 from dvca_sumo.analysis.premise import why_not_reproduced
 from dvca_sumo.analysis.specification import PlanningFinding, first_unusable_plan, first_violating_plan
 from dvca_sumo.analysis.violating import principal
 from dvca_sumo.engine.protocol import Engine
 from dvca_sumo.interventions import Fault, recorded_futures
-from dvca_sumo.messages import PREDICTION_TIMES, Component, MessageId
+from dvca_sumo.messages import PREDICTION_TIMES, MessageId
 from dvca_sumo.record import TICK, MessageMark, Record
 from dvca_sumo.responsibility.judging import Judged
 from dvca_sumo.run import StopRule, Task
@@ -52,16 +53,6 @@ class Request(msgspec.Struct, frozen=True):
     scenario: Scenario
     faults: tuple[Fault, ...] = ()
     repeats: int | None = None  # None: exact mode; else jitter mode with so many runs of each question
-
-
-class Planted(msgspec.Struct, frozen=True):
-    """How the answer compares with the faults that were planted."""
-
-    component: Component
-    altered: tuple[int, ...]  # messages of the factual run that a fault changed
-    component_success: bool
-    message_success: bool
-    message_distance: float | None  # [s] from the reported message to the nearest altered one
 
 
 class Attribution(msgspec.Struct, frozen=True):
@@ -153,8 +144,9 @@ def explain(
     """
     found = unexplained(record)
     if not record.violations:
-        return replace(found, planted=_planted(request.faults, found))
+        return _concluded(found, request)
     asked: list[Dtest] = []
+    is_answered = False
     try:
         found = replace(found, at_fault=at_fault(record, engine.roadmap))
         setting = setting_of(request, record, principal(record.violations))
@@ -162,12 +154,19 @@ def explain(
         found = replace(found, until=setting.stop.at)
         for answer in _steps(found, engine, asked[0], request, from_start=from_start):
             found = answer
+        is_answered = True
         if witness is not None:
             asked.append(Dtest(witness, setting, progress.probe, len(asked[0].probes)))
             found = _certified(found, asked[1])
     except KeyboardInterrupt:
-        raise AttributionStoppedError(replace(found, probes=_all_probes(asked), reason="interrupted")) from None
-    return replace(found, probes=_all_probes(asked), planted=_planted(request.faults, found))
+        partial = _interrupted(found, is_answered=is_answered)
+        raise AttributionStoppedError(_concluded(partial, request, asked)) from None
+    return _concluded(found, request, asked)
+
+
+def unasked(request: Request, record: Record) -> Attribution:
+    """What a factual run shows by itself, where its attribution is interrupted before it begins."""
+    return _concluded(_interrupted(unexplained(record), is_answered=False), request)
 
 
 def unexplained(record: Record) -> Attribution:
@@ -186,8 +185,24 @@ def attribute(engine: Engine, request: Request, progress: Progress) -> Attributi
     return explain(engine, request, record, progress)
 
 
-def _all_probes(asked: list[Dtest]) -> tuple[Probe, ...]:
-    return tuple(probe for dtest in asked for probe in dtest.probes)
+def _interrupted(found: Attribution, *, is_answered: bool) -> Attribution:
+    """What of it holds all the same: a component named before the last question about it was asked does not."""
+    answer = found.components
+    if is_answered:
+        return replace(found, reason=f"{found.reason}; interrupted before that was certified")
+    if answer is None:
+        return replace(found, reason="interrupted")
+    reason = f"interrupted; up to then: {answer.reason}"
+    return replace(found, verdict=Verdict.UNRESOLVED, reason=reason, components=undecided(answer, reason))
+
+
+def _concluded(found: Attribution, request: Request, asked: Sequence[Dtest] = ()) -> Attribution:
+    component = found.components.component if found.components is not None else None
+    return replace(
+        found,
+        probes=tuple(probe for dtest in asked for probe in dtest.probes),
+        planted=planted(request.faults, found.record, component, found.message),
+    )
 
 
 def _settled(record: Record, violation: Violation) -> StopRule:
@@ -299,22 +314,6 @@ def _certified(found: Attribution, witness: Dtest) -> Attribution:
         message=None,
         differences=(),
     )
-
-
-def _planted(faults: tuple[Fault, ...], found: Attribution) -> Planted | None:
-    """Held against the fault of the component that was named, else against the first; None without faults."""
-    if not faults:
-        return None
-    component = found.components.component if found.components is not None else None
-    fault = next((one for one in faults if one.component == component), faults[0])
-    altered = tuple(dict.fromkeys(found.record.altered[fault.component]))  # two faults may touch one message
-    is_right = component == fault.component
-    distance: float | None = None
-    if is_right and found.message is not None and altered:
-        times = [found.record.mark(MessageId(fault.component, index)).time for index in altered]
-        distance = min(abs(time - found.message.time) for time in times)
-    has_message = is_right and found.message is not None and found.message.index in altered
-    return Planted(fault.component, altered, is_right, has_message, distance)
 
 
 def _doubts(record: Record) -> str:

@@ -99,15 +99,17 @@ class Dtest:
         runs = [(question, jitter) for question in new for jitter in self._setting.jitters]
         first = self._first_id + len(self.probes)
 
-        def made(row: int, answer: Glimpse | Failure) -> Probe:
-            return _probe(first + row, *runs[row], answer, self._setting)
+        heard: dict[int, Probe] = {}
 
-        answers = self._engine.glimpses(
-            [self._task(question, jitter) for question, jitter in runs],
-            lambda row, answer: self._on_probe(made(row, answer)),
-        )
-        probes = [made(row, answer) for row, answer in enumerate(answers)]
-        self.probes += probes
+        def hear(row: int, answer: Glimpse | Failure) -> None:
+            heard[row] = _probe(first + row, *runs[row], answer, self._setting)
+            self._on_probe(heard[row])
+
+        try:
+            self._engine.glimpses([self._task(question, jitter) for question, jitter in runs], hear)
+        finally:  # who is interrupted keeps what was answered before
+            probes = [heard[row] for row in sorted(heard)]
+            self.probes += probes
         for question in new:
             outcomes = [one.outcome for one in probes if one.question == question]
             self._answers[self._run(question)] = majority(outcomes)

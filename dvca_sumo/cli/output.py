@@ -1,5 +1,6 @@
 """What every command says and writes, and how it ends."""
 
+import contextlib
 import os
 import tempfile
 from collections.abc import Mapping
@@ -75,6 +76,8 @@ def deliver(text: str, files: Mapping[Path, str]) -> None:
             draft.replace(path)
         except OSError as error:
             lost.append(f"{path}: {error.strerror}")
+            with contextlib.suppress(OSError):
+                draft.unlink()
     unprinted = _printed(text)
     if unprinted is not None and not isinstance(unprinted, BrokenPipeError):
         lost.append(f"standard output: {unprinted.strerror}")

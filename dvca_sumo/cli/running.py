@@ -19,6 +19,7 @@ from dvca_sumo.report.terminal import verdict_text
 from dvca_sumo.stack.sources import StackSource
 
 REPEATS = 3  # of each question in jitter mode
+PARTIAL = "result.partial.json"  # of an interrupted analysis
 
 
 class _Terminal(Progress):
@@ -59,7 +60,7 @@ class _Terminal(Progress):
 @click.option("--certify", is_flag=True, help="Ask the conclusion once more of the replay engine, from time 0.")
 @click.option("--begin", type=float, metavar="T", help="Start of the simulation [s].")
 @click.option("--end", type=float, metavar="T", help="Latest end of the simulation [s].")
-@click.option("-o", "--output", type=Folder(), help="Folder for result.json.")
+@click.option("-o", "--output", type=Folder(), help=f"Folder for result.json; {PARTIAL} when interrupted.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
 def run(
     sumocfg: Path,
@@ -105,7 +106,7 @@ def run(
         found, is_whole = stopped.partial, False
     except KeyboardInterrupt:  # before the first question
         found, is_whole = api.unattributed(drive), False
-    _publish(drive, found, terminal.timing(drive.engine.name), output, as_json=as_json)
+    _publish(drive, found, terminal.timing(drive.engine.name), output, as_json=as_json, is_whole=is_whole)
     if not is_whole:
         raise KeyboardInterrupt
     sys.exit(_exit_code(found))
@@ -118,10 +119,16 @@ def _attributed(drive: FactualDrive, terminal: _Terminal, *, certify: bool) -> A
     return api.attribute(drive, terminal, certify=certify)
 
 
-def _publish(drive: FactualDrive, found: Attribution, timing: Timing, output: Path | None, *, as_json: bool) -> None:
+def _publish(
+    drive: FactualDrive, found: Attribution, timing: Timing, output: Path | None, *, as_json: bool, is_whole: bool
+) -> None:
+    """Print it, and write it into its file; half an answer replaces no whole one of before."""
     result = json.dumps(result_of(drive.request, drive.source, found, timing), indent=1)
     text = result if as_json else verdict_text(found, timing, drive.source.bug)
-    deliver(text, {} if output is None else {output / "result.json": result + "\n"})
+    name = "result.json" if is_whole else PARTIAL
+    deliver(text, {} if output is None else {output / name: result + "\n"})
+    if output is not None and is_whole:
+        (output / PARTIAL).unlink(missing_ok=True)
 
 
 def _exit_code(found: Attribution) -> ExitCode:

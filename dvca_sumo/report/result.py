@@ -6,8 +6,9 @@ from importlib.metadata import PackageNotFoundError, version
 
 import msgspec
 
-from dvca_sumo.analysis.attribution import Attribution, Planted, Request
+from dvca_sumo.analysis.attribution import Attribution, Request
 from dvca_sumo.analysis.dtest import Probe
+from dvca_sumo.analysis.planted import Planted
 from dvca_sumo.interventions import Fault
 from dvca_sumo.messages import COMPONENTS
 from dvca_sumo.record import MessageMark
@@ -64,6 +65,7 @@ def result_of(request: Request, source: StackSource, found: Attribution, timing:
         "component": _component(found),
         "alternatives": [] if found.components is None else [one.value for one in found.components.alternatives],
         "substitutions": _substitutions(found),
+        "substituted_from": None if found.components is None else _finite(found.components.since),
         "message": None
         if found.message is None
         else {"component": found.message.component.value, **_mark(found.message)},

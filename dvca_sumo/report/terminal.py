@@ -3,10 +3,11 @@
 import math
 from collections.abc import Iterator
 
-from dvca_sumo.analysis.attribution import Attribution, Planted
+from dvca_sumo.analysis.attribution import Attribution
 from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.analysis.components import Verdict
 from dvca_sumo.analysis.dtest import Probe
+from dvca_sumo.analysis.planted import Planted
 from dvca_sumo.interventions import UNITS
 from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.record import MessageMark, Record
@@ -101,6 +102,8 @@ def _which_component(found: Attribution) -> Iterator[str]:
     yield f"  because  {found.reason}"
     together = "safe: planning can handle it" if answer.all_ideal is Outcome.SAFE else _ANSWERS[answer.all_ideal]
     yield f"  all four ideal      {together}"
+    if math.isfinite(answer.since):
+        yield f"  each alone          from {answer.since:.1f} s on:"
     for component, outcome in answer.singles.items():
         yield f"  ideal {component.value:<13} {_ANSWERS[outcome]}"
     if answer.alternatives:

@@ -317,15 +317,34 @@ def test_an_interruption_hands_out_what_was_found_until_then(after: int) -> None
     with pytest.raises(AttributionStoppedError) as caught:
         attributed(record, interrupted, faults=(FAULTY,))
     partial = caught.value.partial
-    assert partial.reason == "interrupted"
+    assert partial.reason.startswith("interrupted")
     assert partial.violation == HIT
-    assert len(partial.probes) <= after
+    assert len(partial.probes) == after
     assert partial.message is None
-    if after == 9:
+    assert partial.verdict is Verdict.UNRESOLVED
+    assert partial.planted is not None
+    assert partial.planted.component is PERCEPTION
+    if after == 9:  # all five of Algorithm 1, but not those that decide
         assert partial.components is not None
-        assert partial.components.component is PERCEPTION
-    else:
-        assert partial.verdict is Verdict.UNRESOLVED
+        assert partial.components.component is None
+        assert partial.components.alternatives == (PERCEPTION,)
+        assert "up to then: ideal perception alone" in partial.reason
+
+
+def test_an_interruption_of_the_witness_leaves_the_answer_that_it_was_asked_about() -> None:
+    record = faulty_drive()
+    answers = answering(record, {PERCEPTION: FATAL})
+
+    def interrupted(_: Task) -> Glimpse | Failure:
+        raise KeyboardInterrupt
+
+    with pytest.raises(AttributionStoppedError) as caught:
+        attributed(record, answers, faults=(FAULTY,), witness=interrupted)
+    partial = caught.value.partial
+    assert partial.verdict is Verdict.COMPONENT
+    assert partial.message is not None
+    assert partial.certificate == ()
+    assert partial.reason.endswith("interrupted before that was certified")
 
 
 def test_a_planted_fault_is_found_when_component_and_message_are_its_own() -> None:

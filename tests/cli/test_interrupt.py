@@ -54,16 +54,21 @@ def interrupted(
 def test_an_interrupted_analysis_prints_and_keeps_what_it_has_found(
     tmp_path: Path, by: signal.Signals, times: int, after: str
 ) -> None:
-    """Some send one interrupt after the other, to the command and to its group."""
+    """Some send one interrupt after the other, to the command and to its group. An earlier answer is not lost by it."""
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "result.json").write_text("of before", encoding="utf-8")
     words = ("run", "nets/cs1.sumocfg", "--fault", "perception.miss", "--json", "-o", str(tmp_path / "out"))
     code, out, err = interrupted(words, tmp_path, lambda line: line.startswith(after), by, times)
     assert code == ExitCode.INTERRUPTED
     assert "Traceback" not in err
     assert err.splitlines()[-1] == "interrupted"
     partial = loaded(out)
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["result.json"]
-    assert loaded((tmp_path / "out" / "result.json").read_text(encoding="utf-8")) == partial
-    assert partial["reason"] == "interrupted"
+    kept = {path.name: path.read_text(encoding="utf-8") for path in (tmp_path / "out").iterdir()}
+    assert set(kept) == {"result.json", "result.partial.json"}
+    assert kept["result.json"] == "of before"
+    assert loaded(kept["result.partial.json"]) == partial
+    assert partial["reason"].startswith("interrupted")
+    assert partial["planted"]["component"] == "perception"
     assert partial["violations"]
     assert partial["message"] is None
 

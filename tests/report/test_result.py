@@ -278,7 +278,7 @@ def test_an_interrupted_attribution_is_a_whole_result() -> None:
 
     with pytest.raises(AttributionStoppedError) as caught:
         attributed(record, interrupted, faults=(FAULTY,))
-    assert told(caught.value.partial, (FAULTY,))["reason"] == "interrupted"
+    assert told(caught.value.partial, (FAULTY,))["reason"].startswith("interrupted")
 
 
 def test_endless_limits_are_null() -> None:
