@@ -7,7 +7,6 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.geometry.boxes import Neighbours, box_of, neighbours
-from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import Floats, Integers
 from dvca_sumo.roadmap import RoadMap, Route
 from dvca_sumo.truth import Moment, ObjectsTruth
@@ -93,11 +92,6 @@ class Places:
         last = len(self.route.lane_ids) - 1
         found: Integers = self.route.line.stations.searchsorted(stations, side="right")
         return np.minimum(np.maximum(found - 1, 0), last)
-
-    def line(self, lane: str) -> Polyline | None:
-        """The middle of a lane; None of what the map does not have."""
-        known = self.roadmap.lanes.get(lane)
-        return None if known is None else known.line
 
     def lane(self, moment: Moment) -> str | None:
         """The ego's lane: the route's where its front is inside it, else the nearest to its middle within 3 m."""

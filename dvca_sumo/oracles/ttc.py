@@ -5,25 +5,21 @@ models for vehicle tracking (2008).
 """
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
 from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.boxes import box_of, contact_times, distances
-from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import Flags, Floats, Integers
 from dvca_sumo.oracles.ahead import ahead
 from dvca_sumo.oracles.findings import Findings
+from dvca_sumo.oracles.lane_courses import Motion, lane_courses
 from dvca_sumo.oracles.place import Places
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import Moment, ObjectsTruth
 from dvca_sumo.violations import Category, Ending, Judgement, Violation
 
-Motion = Callable[[float], tuple[float, float, float]]  # where a body is after so many seconds: x, y, heading
-
 _STEP = 0.05  # [s] between the places where two are compared
-_ALIGNED = 0.1  # [rad] between a body and the lane it drives along
 
 
 class TimeToCollision:
@@ -34,7 +30,8 @@ class TimeToCollision:
     also holds in a curve. Not judged: a slow ego, objects wholly behind one that drives forwards (the
     hazard is the follower's), and boxes that touch already (that is a collision). Nor is a contact that
     does not come about when both go on turning as they do, or when the other goes on along the lane it
-    drives along: two cars that pass each other in a bend, or where lanes of straight pieces have a corner.
+    drives along, wherever that leads: two cars that pass each other in a bend, or where lanes of straight
+    pieces have a corner.
     """
 
     kind = "ttc"
@@ -79,9 +76,10 @@ class TimeToCollision:
         size = objects.boxes[row, 3:]
         if not _is_touched(moment, size, _turning(objects, row, before), horizon):
             return False
-        line = self._places.line(objects.lanes[row]) if objects.lanes else None
-        motion = None if line is None else _along(line, objects, row)
-        return motion is None or _is_touched(moment, size, motion, horizon)
+        lane = objects.lanes[row] if objects.lanes else ""
+        speed = math.hypot(*objects.velocities[row].tolist())
+        courses = lane_courses(self._places.roadmap, lane, objects.boxes[row], speed, horizon)
+        return not courses or any(_is_touched(moment, size, course, horizon) for course in courses)
 
     def conclude(self, ended: Ending) -> Judgement:  # noqa: ARG002  the answer holds for whatever part was seen
         """See `Oracle`."""
@@ -144,21 +142,6 @@ def _turning(objects: ObjectsTruth, row: int, before: ObjectsTruth | None) -> Mo
     east, north = objects.velocities[row].tolist()
     speed, course = math.hypot(east, north), math.atan2(north, east)
     return lambda time: (*_moved(x, y, speed, course, rate, time), heading + rate * time)
-
-
-def _along(line: Polyline, objects: ObjectsTruth, row: int) -> Motion | None:
-    """On, as fast as now and beside `line` as now; None where it does not drive along that."""
-    x, y, heading, *_ = objects.boxes[row].tolist()
-    (station,), (offset,) = line.project([[x, y]])
-    speed = math.hypot(*objects.velocities[row].tolist())
-    if abs(wrapped(heading - float(line.poses([station])[0, 2]))) > _ALIGNED:
-        return None
-
-    def motion(time: float) -> tuple[float, float, float]:
-        x, y, heading = line.poses([station + speed * time], offset)[0].tolist()
-        return x, y, heading
-
-    return motion
 
 
 def _moved(x: float, y: float, speed: float, course: float, rate: float, time: float) -> tuple[float, float]:

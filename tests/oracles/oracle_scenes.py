@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable
-from typing import cast
+from typing import Any, ClassVar, cast
 
 import msgspec
 import numpy as np
@@ -24,6 +24,8 @@ Row = tuple[str, tuple[float, float, float, float, float], tuple[float, float]]
 
 class BareMap:
     """A map without lanes beside the route."""
+
+    lanes: ClassVar[dict[str, Any]] = {}
 
     def lanes_near(self, points: np.ndarray, radius: float) -> list[tuple[str, ...]]:  # noqa: ARG002
         return [() for _ in points]

@@ -145,7 +145,7 @@ def test_who_drives_round_the_corner_of_its_own_lane_is_no_hazard(*, drifts: boo
     class Map(BareMap):
         """One lane."""
 
-        lanes: ClassVar = {"out_0": SimpleNamespace(line=lane)}
+        lanes: ClassVar = {"out_0": SimpleNamespace(line=lane, successors=())}
 
     oracle = TimeToCollision(Places(straight_road(), cast("RoadMap", Map())), Thresholds())
     course = math.pi + slope
