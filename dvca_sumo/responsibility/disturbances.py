@@ -41,7 +41,7 @@ class Disturbance(msgspec.Struct, frozen=True):
 
     time: float  # [s]
     object: str
-    how: str  # "appeared", "jumped", or "walked" into the standing ego, or at its flank
+    how: str  # "appeared", or was there as the ego did, "jumped", or "walked" into the standing ego, or at its flank
 
     def lasts(self, time: float) -> bool:
         """Whether what that body does at `time` [s] may still come from it."""
@@ -76,7 +76,8 @@ class Disturbances:
             jumped = now[
                 _leaps(objects, now, before, np.array([self._rows[name] for name in common], dtype=np.int64))
             ].tolist()
-        for how, candidates in (("appeared", appeared), ("jumped", jumped)):
+        arises = "was there as the ego appeared" if before is None else "appeared"
+        for how, candidates in ((arises, appeared), ("jumped", jumped)):
             for name in (names[row] for row in candidates):
                 self._sudden.setdefault(name, []).append(Disturbance(moment.time, name, how))
             for row in self._too_near(moment, candidates):

@@ -325,7 +325,9 @@ def test_who_walks_along_beside_the_ego_has_not_walked_at_its_flank(roads: RoadM
         on_foot(moment(0.1 * k, 202.0 + 0.1 * k, 1.0, [("p", (200.0 + 0.12 * k, LANE_Y - 1.4), 1.2 * (k > 0))]))
         for k in range(9)
     ]
-    assert disturbances(people, roads) == [("p", "appeared")]  # with the ego, which has just departed
+    assert disturbances(people, roads) == [
+        ("p", "was there as the ego appeared")
+    ]  # with the ego, which has just departed
 
 
 def _walked(k: int, front: float, *, waits: bool) -> Moment:
