@@ -11,7 +11,6 @@ from typing import TypeVar
 Net = TypeVar("Net")
 
 _HEADER = "net                       completed  collisions  violations  travel time (median)  SUMO's driver: violations"
-_SCREEN = "from dvca_sumo.cli import main; main()"
 
 
 def table(nets: Mapping[str, Net], built: Callable[[Path, Net], Path], egos: int, *window: str) -> None:
@@ -50,7 +49,7 @@ def _row(name: str, config: Path, asked: argparse.Namespace, *window: str) -> st
     """Screen a net, with further options of `dvca-sumo screen`; all of it stands in the folder `out` beside it."""
     words = ["screen", str(config), "--egos", asked.egos, "--seed", asked.seed, "--jobs", asked.jobs, *window]
     words += ["-o", str(config.parent / "out"), "--json"]
-    done = subprocess.run([sys.executable, "-c", _SCREEN, *words], check=False, capture_output=True, text=True)  # noqa: S603
+    done = subprocess.run([sys.executable, "-m", "dvca_sumo", *words], check=False, capture_output=True, text=True)  # noqa: S603
     if not done.stdout:
         raise SystemExit(done.stderr)
     found = json.loads(done.stdout)

@@ -16,7 +16,7 @@ import dvca_sumo
 Result = dict[str, Any]  # what --json prints
 
 # -P: as with the installed command, Python itself does not look into the working folder.
-COMMAND = (sys.executable, "-P", "-c", "from dvca_sumo.cli import main; main()")
+COMMAND = (sys.executable, "-P", "-m", "dvca_sumo")
 _TIMEOUT = 300.0  # [s] only ever reached by a defect
 
 

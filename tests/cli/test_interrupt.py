@@ -5,12 +5,15 @@ import os
 import select
 import signal
 import subprocess
+import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 from command_line import COMMAND, Said, environment, loaded
 
+import dvca_sumo
+from dvca_sumo.__main__ import main
 from dvca_sumo.bench.cases import real_bug_cases
 from dvca_sumo.cli import ExitCode, screening
 
@@ -101,3 +104,23 @@ def test_an_interrupted_screening_prints_no_rates_but_says_what_is_kept(
     assert last == "interrupted"
     assert [word in told for word in (f"kept in {tmp_path}", "goes on from there")] == [is_kept] * 2
     assert [word in told for word in ("nothing is kept", "with -o")] == [not is_kept] * 2
+
+
+class Interrupt:
+    """Finds the command line's modules, and is interrupted by it."""
+
+    def find_spec(self, name: str, *_: object) -> None:
+        if name.startswith("dvca_sumo.cli"):
+            raise KeyboardInterrupt
+
+
+def test_an_interrupt_while_the_program_loads_is_one_as_any_other(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delitem(sys.modules, "dvca_sumo.cli")
+    monkeypatch.delattr(dvca_sumo, "cli")
+    monkeypatch.setattr(sys, "meta_path", [Interrupt(), *sys.meta_path])
+    with pytest.raises(SystemExit) as caught:
+        main()
+    assert caught.value.code == ExitCode.INTERRUPTED
+    assert capsys.readouterr().err == "interrupted\n"
