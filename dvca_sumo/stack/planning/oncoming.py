@@ -39,6 +39,9 @@ def waits(
     directions = futures.directions[: scene.moving]
     comes: Flags = (directions[:, 0] < -ALONG) | (directions[:, -1] < -ALONG)
     comes &= ~scene.is_person[: scene.moving]
+    if np.count_nonzero(comes):  # who has passed the ego does not come any more
+        noses = futures.stations[: scene.moving] + futures.half_lengths[: scene.moving]
+        comes &= noses.max(axis=1) > -shape.rear_overhang
     if not np.count_nonzero(comes):
         return []
     found = []

@@ -90,7 +90,8 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         """Stations, offsets and the line's heading there, of points (m, 2).
 
         The same as `Polyline.project` within a centimetre, for hundreds of points at a fraction of the
-        cost. Offsets of points beyond an end hold the distance to that end.
+        cost. Behind its beginning the line goes on straight: who follows the ego is in its lane there, too.
+        Offsets of points beyond its end hold the distance to that.
         """
         nodes = self.rows[:2, ::_NODES].copy()
         x, y = nodes
@@ -109,10 +110,13 @@ class Window(msgspec.Struct, frozen=True, eq=False):
         turn = curvatures * step
         missed = ahead - step * scale
         offsets = across - 0.5 * turn * step
-        beyond = (np.abs(missed) > 1.0).nonzero()[0]
+        stations, is_behind = step + (rows - BEHIND), (rows == 0.0) & (ahead < -1.0)
+        beyond = ((np.abs(missed) > 1.0) & ~is_behind).nonzero()[0]
         if beyond.size:
             offsets[beyond] = np.copysign(np.hypot(missed[beyond], offsets[beyond]), offsets[beyond])
-        return step + (rows - BEHIND), offsets, headings + turn
+        if np.count_nonzero(is_behind):
+            stations[is_behind], offsets[is_behind], turn[is_behind] = ahead[is_behind] - BEHIND, across[is_behind], 0.0
+        return stations, offsets, headings + turn
 
     def _seen(self, points: Floats, rows: Integers) -> tuple[Floats, Floats, Floats, Floats]:
         x, y, cosines, sines, headings, curvatures = self.rows[:6].take(rows, axis=1, mode="clip")

@@ -1,5 +1,7 @@
 """The ST graph: when each future occupies which part of the path, and what that asks of the ego."""
 
+import math
+
 import msgspec
 import numpy as np
 
@@ -263,7 +265,8 @@ def _leads(row: int, graph: Graph, lanes: frozenset[str], shape: VehicleShape, c
         return bool(scene.times[first] <= PRESENT) and not _leaves_oncoming(row, graph, shape)
     aslant = futures.half_widths[row, : first + 1] - 0.5 * scene.boxes[scene.owners[row], 4]  # wider than it is
     is_along = futures.directions[row, 0] > ALONG
-    is_in_lane = is_along and (graph.gaps[row, : first + 1] + aslant).max() < config.object_margin
+    gaps = np.where(futures.stations[row, : first + 1] > -BEHIND, graph.gaps[row, : first + 1], -math.inf)
+    is_in_lane = is_along and (gaps + aslant).max() < config.object_margin
     is_crossing = not is_in_lane or (not lanes.issuperset(scene.lanes[row]) and graph.is_off_lane(row, shape.width))
     return False if is_crossing else None
 

@@ -41,6 +41,14 @@ def test_ego_waits_before_it_leaves_its_lane_for_who_comes_towards_it(x: float, 
     assert driven.fronts[-1] > 200.0
 
 
+def test_ego_goes_on_as_soon_as_who_came_towards_it_has_passed() -> None:
+    driven = meeting(220.0, 6.0)
+    fronts = 220.0 - 6.0 * driven.states[:, 0] - 0.5 * 4.5
+    has_passed = fronts + 4.5 < driven.fronts - SHAPE.length
+    goes = (driven.speeds > 1.0) & (driven.states[:, 0] > 15.0)
+    assert goes.argmax() - has_passed.argmax() < 10
+
+
 def behind_a_junction(end: float) -> Route:
     """The same lane, with a junction from 83 m to 95 m."""
     return msgspec.structs.replace(swerving(1.0, end), stop_lines=(stop_line(83.0, Control.YIELD),))
@@ -143,4 +151,4 @@ def test_who_comes_is_waited_for_where_the_ego_itself_will_come_back_on_that_lan
     route = msgspec.structs.replace(route, lane_left=1.6 - across, lane_right=-1.6 - across)
     driven = drive(route, 30.0, speed=8.0, actors=[car(5, 150.0, 3.2, heading=math.pi, speed=8.0)])
     assert driven.clearances.min() > 0.5
-    assert driven.states[-1, 1] > 80.0
+    assert driven.states[-1, 2] == pytest.approx(3.2, abs=0.1)  # on its way back

@@ -249,7 +249,15 @@ def test_window_projects_like_the_line_itself() -> None:
 
 def test_window_tells_points_beyond_its_ends_from_points_on_the_line() -> None:
     window = Reference(road(), SHAPE, PlanningConfig()).window(100.0, 50.0)
-    stations, offsets, _ = window.project(np.array([[70.0, 0.0], [200.0, 0.5], [120.0, 0.5]]))
-    assert stations[0] >= -BEHIND - 1.5
-    assert np.abs(offsets[:2]).min() > 5.0
-    assert offsets[2] == 0.5
+    stations, offsets, _ = window.project(np.array([[200.0, 0.5], [120.0, 0.5]]))
+    assert abs(offsets[0]) > 5.0
+    assert (stations[1], offsets[1]) == (20.0, 0.5)
+
+
+def test_behind_its_beginning_the_line_of_a_window_goes_on_straight() -> None:
+    window = Reference(road(), SHAPE, PlanningConfig()).window(100.0, 50.0)
+    behind = np.array([[100.0 - BEHIND - 0.4, 1.0], [100.0 - BEHIND - 1.6, 1.0], [30.0, -3.0]])
+    stations, offsets, headings = window.project(behind)
+    np.testing.assert_allclose(stations, behind[:, 0] - 100.0, atol=1e-9)
+    np.testing.assert_allclose(offsets, behind[:, 1], atol=1e-9)
+    np.testing.assert_allclose(headings, 0.0, atol=1e-9)
