@@ -2,7 +2,7 @@
 
 import enum
 import math
-from collections.abc import Iterable
+from collections.abc import Container
 
 import msgspec
 import numpy as np
@@ -53,9 +53,14 @@ class Meetings:
         self._config = config
         self._passing: frozenset[int] = frozenset()
 
-    def settle(self, passing: Iterable[int]) -> None:
-        """End a cycle in which the ego passes in front of the tracks `passing`."""
-        self._passing = frozenset(passing)
+    def settle(self, rows: list[int], yielding: Container[int], graph: Graph, profile: Profile) -> None:
+        """End a cycle in which the ego, driving `profile`, meets the futures `rows`, and lets the tracks `yielding` go.
+
+        It passes in front of all others, but for those who are gone before it comes.
+        """
+        come = ~self._comes_after(np.array(rows), graph, profile) if rows else ()
+        passed = (graph.track(row) for row, is_one in zip(rows, come, strict=True) if is_one)
+        self._passing = frozenset(track for track in passed if track not in yielding)
 
     def demands(self, rows: list[int], graph: Graph, views: list[LineView], profile: Profile) -> list[Demand]:
         """What the futures `rows` ask of an ego that would otherwise drive `profile`."""

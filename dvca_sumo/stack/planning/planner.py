@@ -177,7 +177,7 @@ class Planner:
             stops_now = [*stops, *_merged(demands, graph)]
             profile = self._driver.roll_out(start.speed, start.acceleration, caps, stops_now, leader)
         yielding = {graph.track(row) for row in demands}
-        self._meetings.settle({graph.track(row) for row in others} - yielding)
+        self._meetings.settle(others, yielding, graph, profile)
         return profile
 
 

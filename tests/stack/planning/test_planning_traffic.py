@@ -1122,3 +1122,35 @@ def test_behind_a_long_one_that_cuts_the_bend_on_the_next_lane_the_ego_stays_wit
     driven = drive(road(points, lanes_left=1), 14.0, speed=speed + 1.0, station=10.0, actors=[bus])
     assert driven.clearances.min() > 0.5
     assert driven.states[:, 5].min() > -3.0
+
+
+@pytest.mark.parametrize("behind", [25.0, 32.0, 45.0, 60.0])
+@pytest.mark.parametrize("speed", [10.0, 14.0])
+@pytest.mark.parametrize("route", [road(), road(curve_points(60.0, before=100.0))])
+def test_an_ego_that_sets_off_does_not_wait_for_who_comes_up_behind_it(
+    behind: float, speed: float, route: Route
+) -> None:
+    x, y, heading = route.line.poses(np.array([110.0 - behind]))[0]
+    driven = drive(route, 1.5, station=110.0, actors=[car(7, x, y, heading=heading, speed=speed)])
+    assert not any(decision.startswith("yield") for decision in driven.decisions)
+    assert driven.speeds[-1] > 1.5
+
+
+def test_who_was_gone_before_the_ego_came_and_then_slows_down_was_not_passed_in_front_of() -> None:
+    """The ego goes first only where it would do so without having met that one before."""
+    route = road(stop_lines=[stop_line(52.0, Control.YIELD)])
+
+    def plan(earlier: list[float], arrives: float) -> str:
+        planner = Planner(PlanningConfig(), route, SHAPE)
+        for cycle, arrival in enumerate([*earlier, arrives]):
+            time = 0.1 * cycle
+            crossing = car(7, 60.0, -8.0 * arrival, heading=UP, speed=8.0, lanes=("major_0",))
+            others = predicted([crossing], 0.0) if arrival < math.inf else predicted([], 0.0)
+            others = msgspec.structs.replace(others, objects=msgspec.structs.replace(others.objects, time=time))
+            planned = planner.step(believed(20.0 + 10.0 * time, speed=10.0, time=time), others, {})
+        return planned.decision
+
+    arrivals = np.arange(5.0, 8.0, 0.25).tolist()
+    decisions = [plan([math.inf], arrives) for arrives in arrivals]
+    assert {decision.split()[0] for decision in decisions} == {"yield", "cruise"}
+    assert [plan([1.0], arrives) for arrives in arrivals] == decisions
