@@ -68,6 +68,7 @@ class Gaps:
     def __init__(self, line: Polyline, destination: float, shape: VehicleShape, config: PlanningConfig) -> None:
         """The ego stops at the station `destination` [m]."""
         self._line = line
+        self._begin: Floats = line.poses([0.0])[0]
         self._destination = destination
         self._shape = shape
         self._config = config
@@ -76,7 +77,7 @@ class Gaps:
         """For each lane of the change, who is on it or partly so, or soon; places count from the station `here` [m]."""
         boxes, velocities = objects.boxes, objects.velocities
         reach = _SEEN + _BEYOND
-        stations, offsets = self._line.project(boxes[:, :2], between=(here - reach, here + reach))
+        stations, offsets = self._located(boxes[:, :2], here - reach, here + reach)
         headings = self._line.headings_at(stations)
         angles = boxes[:, 2] - headings
         directions = np.cos(angles)
@@ -98,6 +99,20 @@ class Gaps:
             tracks = objects.ids[rows].tolist()
             found.append(Neighbours(places - halves, places + halves, speeds[rows], is_traffic, tracks))
         return found
+
+    def _located(self, points: Floats, low: float, high: float) -> tuple[Floats, Floats]:
+        """Stations and offsets of `points` (m, 2), looked for from `low` to `high`.
+
+        The line begins where the ego came from shortly before: behind that it goes on straight.
+        """
+        stations, offsets = self._line.project(points, between=(low, high))
+        behind = (stations <= 0.0).nonzero()[0]
+        if behind.size:
+            x, y, heading = self._begin
+            east, north = (points[behind] - (x, y)).T
+            stations[behind] = east * math.cos(heading) + north * math.sin(heading)
+            offsets[behind] = north * math.cos(heading) - east * math.sin(heading)
+        return stations, offsets
 
     def is_free(self, lane: Neighbours, change: LaneChange, window: Window, speed: float, urgency: Urgency) -> bool:
         """Whether nobody on the lane has to brake more than a little when the ego is there; hurried, at once.

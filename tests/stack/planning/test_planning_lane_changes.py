@@ -331,3 +331,13 @@ def test_who_is_far_away_is_on_no_lane_beside_their_own(ahead: float) -> None:
         lanes = gaps.occupied(change, here, predicted([car(7, x, y)], 0.0).objects)
         found = [lane for lane, occupied in enumerate(lanes) if occupied.tracks]
         assert found == ([] if abs(ahead) > 120.0 else [0 if ahead < 0.0 else 2])
+
+
+@pytest.mark.parametrize("behind", [5.0, 26.0, 46.0])
+def test_who_comes_from_behind_the_beginning_of_the_line_is_on_the_lane_that_it_is_on(behind: float) -> None:
+    route, here = crossing_over(), 16.0
+    others = [car(7, here - behind, WIDTH, speed=25.0), car(8, here - behind, 0.1, speed=25.0)]
+    change = msgspec.structs.replace(route.lane_changes[0], start_station=START)
+    own, following = beside(route, PlanningConfig()).occupied(change, here, predicted(others, 0.0).objects)
+    assert (own.tracks, following.tracks) == ([8], [7])
+    assert following.fronts[0] == pytest.approx(2.25 - behind)
