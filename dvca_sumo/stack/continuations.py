@@ -123,8 +123,16 @@ class Continuations:
         followed = open_ways if open_ways and lanes[lane].is_drivable else lanes[lane].successors
         weights = {}
         for name in followed:
-            headings = lanes[name].line.headings
-            turn = abs(wrapped(float(headings[-1 if lanes[name].is_internal else 0] - lanes[lane].line.headings[-1])))
+            turn = abs(wrapped(self._heading_past(name) - float(lanes[lane].line.headings[-1])))
             weight = _STRAIGHT_WEIGHT if turn < _STRAIGHT else 1.0
             weights[name] = weight if turn < _TURNAROUND else _TURNAROUND_WEIGHT
         return weights
+
+    def _heading_past(self, name: str) -> float:
+        """Where a lane leads [rad]: across a junction, the way of those who wait on it being in parts, its last one."""
+        lane = self._lanes[name]
+        if not lane.is_internal:
+            return float(lane.line.headings[0])
+        while len(lane.successors) == 1 and self._lanes[lane.successors[0]].is_internal:
+            lane = self._lanes[lane.successors[0]]
+        return float(lane.line.headings[-1])
