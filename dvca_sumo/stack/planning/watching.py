@@ -80,10 +80,14 @@ class WatchList:
             )
             if kind in _WATCHED_CLASSES
         }
+        half_lengths = dict(zip(objects.ids.tolist(), (0.5 * objects.boxes[:, 3]).tolist(), strict=True))
         watched = {}
         for track, place in sorted(self._watched.items(), key=lambda one: one[0] not in there):  # the lost ones last
             found = track if track in there else _found_again(place, there)
-            if found is None or math.dist(there[found], place.approach.line.points[-1]) > self._config.watch_until:
+            if found is None:
+                continue
+            waits_within = self._config.watch_before + half_lengths[found] + _SAME  # its middle, however long it is
+            if math.dist(there[found], place.approach.line.points[-1]) > max(self._config.watch_until, waits_within):
                 continue
             watched[found] = _Place(*there.pop(found), place.approach)
         self._watched = watched

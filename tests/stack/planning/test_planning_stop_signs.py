@@ -107,3 +107,13 @@ def test_who_is_lost_is_crossed_out_and_who_changes_its_number_is_not() -> None:
     watching.step(predicted(BICYCLES[1:], 0.2).objects, is_standing=True)
     assert watching.waits_for(0.0) == [2]
     assert watching.waits_for(8.0) == []
+
+
+@pytest.mark.parametrize("length", [4.5, 12.0, 18.0])
+@pytest.mark.parametrize("before", [0.5, 4.5])
+def test_who_waits_at_its_sign_is_waited_for_however_long_it_is(length: float, before: float) -> None:
+    front = -6.0 - before
+    waiting = Actor(7, ObjectClass.VEHICLE, 106.0, front - 0.5 * length, heading=math.pi / 2.0, size=(length, 2.5))
+    watching = WatchList((APPROACH,), FIXED)
+    watching.step(predicted((waiting,), 0.0).objects, is_standing=False)
+    assert watching.waits_for(0.0) == [7]
