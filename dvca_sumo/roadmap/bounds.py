@@ -82,7 +82,7 @@ def way_beside(
 
 
 def evened(offsets: Floats) -> Floats:
-    """Without the kinks of the net's shapes, at points 1 m apart; both ends stay where they are."""
+    """Without the kinks of the net's shapes, at points 1 m apart."""
     reach = min(_EVENED, len(offsets) - 1)
     kernel = np.hanning(2 * reach + 3)[1:-1]
     padded = np.concatenate((np.full(reach, offsets[0]), offsets, np.full(reach, offsets[-1])))

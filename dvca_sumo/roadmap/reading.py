@@ -31,7 +31,6 @@ class NetContents(msgspec.Struct, frozen=True, eq=False):
     edges: dict[str, tuple[str, ...]]  # lane ids by index, normal edges only
     movements: dict[str, tuple[Movement, ...]]  # of vehicles, by approach lane
     junctions: dict[str, Junction]
-    is_left_hand: bool  # lane 0 is the leftmost
 
 
 def read_net(path: Path, vehicle_class: str) -> NetContents:
@@ -59,7 +58,6 @@ def read_net(path: Path, vehicle_class: str) -> NetContents:
         edges={edge.getID(): tuple(_lane_ids(edge)) for edge in edges if not edge.getFunction()},
         movements=_by_approach(junctions.values()),
         junctions=junctions,
-        is_left_hand=is_left_hand,
     )
 
 

@@ -14,7 +14,7 @@ from dvca_sumo.stack.planning.scene import ALONG
 from dvca_sumo.stack.planning.speed import HARD_GAP, slowed_before
 from dvca_sumo.stack.planning.st_graph import AT_CROSSING, Graph
 
-_PERSON, _VEHICLE = int(ObjectClass.PEDESTRIAN), int(ObjectClass.VEHICLE)
+_VEHICLE = int(ObjectClass.VEHICLE)
 _PRIORITY = Control.PRIORITY
 _SLOW_FOR_PERSON = (3.0, 6.0)  # [m/s], [m/s per m of gap]
 _SLOW_FOR_OBJECT = (4.0, 10.0)  # [m/s], [m/s per m of gap]
