@@ -24,7 +24,7 @@ from dvca_sumo.analysis.dtest import Dtest, Probe, Setting, could_not_tell
 from dvca_sumo.analysis.last_chance import UndecidedError, decisive, is_by_luck
 from dvca_sumo.analysis.messages import MessageAnswer
 from dvca_sumo.analysis.planted import Planted, planted
-from dvca_sumo.analysis.premise import why_not_reproduced
+from dvca_sumo.analysis.premise import UntoldError, why_not_reproduced
 from dvca_sumo.analysis.specification import PlanningFinding, first_unusable_plan, first_violating_plan
 from dvca_sumo.analysis.violating import principal
 from dvca_sumo.engine.protocol import Engine
@@ -230,7 +230,11 @@ def _steps(
 ) -> Iterator[Attribution]:
     """The answer after each step of Algorithm 1."""
     assert found.violation is not None  # or there would be nothing to explain
-    doubt = why_not_reproduced(engine, dtest, _factual_task(request), found.record, from_start=from_start)
+    try:
+        doubt = why_not_reproduced(engine, dtest, _factual_task(request), found.record, from_start=from_start)
+    except UntoldError as error:
+        yield replace(found, verdict=Verdict.UNRESOLVED, reason=str(error))
+        return
     if doubt:
         yield replace(found, verdict=Verdict.NOT_REPRODUCIBLE, is_reproducible=False, reason=doubt)
         return

@@ -9,17 +9,27 @@ from dvca_sumo.scenario import ScenarioError
 from dvca_sumo.stack.reference import StackError
 
 
+class UntoldError(Exception):
+    """Whether the violation comes about again could not be told."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(f"the repeated run could not be told: {reason}")
+
+
 def why_not_reproduced(engine: Engine, dtest: Dtest, factual: Task, record: Record, *, from_start: bool) -> str:
     """Why the violation of a factual run, that `record`, does not come about again; empty when it does.
 
     Asks `dtest` its first question. With `from_start` it takes one more run by `engine`, from time 0.
+
+    Raises:
+        UntoldError: See there.
     """
     outcome = dtest.ask(Question(()))
-    if outcome is not Outcome.VIOLATES and factual.jitter is not None:
-        return f"most re-runs do not violate: {outcome}"
-    probe = dtest.probes[0]
     if outcome is Outcome.UNRESOLVED:
-        return f"the repeated run could not be told: {probe.reason}"
+        raise UntoldError(next((one.reason for one in dtest.probes if one.reason), "no outcome is that of most runs"))
+    if outcome is Outcome.SAFE and factual.jitter is not None:
+        return "most re-runs do not violate"
+    probe = dtest.probes[0]
     digests = record.digests
     is_at_once = probe.steps == 0 and outcome is Outcome.VIOLATES  # at the departure: nothing was driven before
     is_same = is_at_once or (probe.steps > 0 and digests[probe.steps - 1 : probe.steps] == [probe.last_step])
@@ -35,7 +45,9 @@ def _differing(engine: Engine, factual: Task, record: Record, *, is_known: bool)
     try:
         again = engine.record(factual).digests
     except (ScenarioError, StackError, RunFailedError) as error:
-        return f"{'the repeated run differs, and ' if is_known else ''}one more run failed: {error}"
+        if not is_known:
+            raise UntoldError(f"one more run failed: {error}") from None
+        return f"the repeated run differs, and one more run failed: {error}"
     if again == record.digests:
         return "the repeated run differs, one more does not" if is_known else ""
     pairs = enumerate(zip(record.digests, again, strict=False))
