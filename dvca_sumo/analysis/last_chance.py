@@ -94,16 +94,18 @@ def _later(
     """Components not `seen` that could have prevented it later than the last one that was.
 
     `last`: its last chance, and the latency [s]. Those upstream count as later up to the latency earlier. One
-    that was not enough from where all were asked is not asked after that again.
+    that was not enough from where all were asked is not asked after that again; one that could not be told is.
     """
     component, (chance, latency) = seen[-1], last
     place = SUBSTITUTABLE.index(component)
     for other in (one for one in SUBSTITUTABLE[:place] if one not in seen):
-        is_open = answer.singles[other] is not Outcome.SAFE and chance - latency < answer.since
-        if is_open and _is_enough(dtest, record, other, chance - latency, time):
+        single = answer.singles[other]
+        is_earlier = single is Outcome.VIOLATES and chance - latency < answer.since
+        if (is_earlier or single is Outcome.UNRESOLVED) and _is_enough(dtest, record, other, chance - latency, time):
             yield other
     for other in (one for one in SUBSTITUTABLE[place + 1 :] if one not in seen):
-        if answer.singles[other] is not Outcome.SAFE or not _is_enough(dtest, record, other, chance + latency, time):
+        is_open = answer.singles[other] is not Outcome.VIOLATES
+        if not is_open or not _is_enough(dtest, record, other, chance + latency, time):
             continue
         if other not in _SENSING and component in _SENSING and _do_their_best(dtest, record, chance):
             continue

@@ -7,7 +7,9 @@ import pytest
 
 from analysis.scenes import (
     CRASHED,
+    SAFE,
     START,
+    VIOLATING,
     FakeEngine,
     answering,
     asking,
@@ -234,6 +236,44 @@ def test_where_a_question_that_decides_could_not_be_told_nobody_is_named(
     assert found.components.reason == found.reason
     assert Outcome.UNRESOLVED in [probe.outcome for probe in found.probes]
     assert attributed(DRIVE, enough).verdict is Verdict.COMPONENT
+
+
+@pytest.mark.parametrize(("crashes_before", "named"), [(0.9, PERCEPTION), (0.1, None)])
+def test_one_downstream_that_could_not_be_told_is_asked_by_the_last_chance(
+    crashes_before: float, named: Component | None
+) -> None:
+    """It may have had a later one; where that cannot be told either, nobody is named."""
+    enough = answering(DRIVE, {LOCALIZATION: last(LOCALIZATION, 0.95), PERCEPTION: last(PERCEPTION, 0.4)})
+
+    def answers(task: Task) -> Glimpse | Failure:
+        substituted = ideals(task)
+        return CRASHED if set(substituted) == {PERCEPTION} and back_of(substituted) > crashes_before else enough(task)
+
+    found = attributed(DRIVE, answers)
+    assert found.components is not None
+    assert found.components.singles[PERCEPTION] is Outcome.UNRESOLVED
+    assert found.components.component is named
+    assert (found.verdict is Verdict.UNRESOLVED) == (named is None)
+
+
+@pytest.mark.parametrize(("late", "named"), [(SAFE, PERCEPTION), (VIOLATING, PREDICTION), (CRASHED, None)])
+def test_one_upstream_that_could_not_be_told_is_asked_however_late(
+    late: Glimpse | Failure, named: Component | None
+) -> None:
+    """Of perception, between localization that is named first and prediction that had a later chance."""
+    enough = answering(DRIVE, {LOCALIZATION: last(LOCALIZATION, 0.95), PREDICTION: last(PREDICTION, 0.4)})
+
+    def answers(task: Task) -> Glimpse | Failure:
+        substituted = ideals(task)
+        if set(substituted) == {PERCEPTION}:
+            back = back_of(substituted)
+            return CRASHED if back > 0.9 else VIOLATING if not 0.5 < back < 0.7 else late
+        return VIOLATING if is_sensing(substituted) else enough(task)
+
+    found = attributed(DRIVE, answers)
+    assert found.components is not None
+    assert found.components.singles[PERCEPTION] is Outcome.UNRESOLVED
+    assert found.components.component is named
 
 
 def test_a_question_on_which_nothing_depends_may_stay_open() -> None:
