@@ -59,6 +59,7 @@ class Judgement(msgspec.Struct, frozen=True):
     answer: Answer
     violations: tuple[Violation, ...] = ()  # by time; empty unless VIOLATED
     reason: str = ""  # why it could not tell; empty unless UNKNOWN
+    needs_end: bool = False  # only a whole drive can answer: not known of one that is cut short is no reason for doubt
 
 
 class Ending(enum.StrEnum):

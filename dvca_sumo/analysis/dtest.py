@@ -189,7 +189,7 @@ def outcome_of(answer: Glimpse, setting: Setting) -> tuple[Outcome, str]:
         return Outcome.VIOLATES, ""
     blind = [one for one in could_not_tell(answer.judgements) if one.kind not in setting.untold]
     if setting.is_mission:
-        blind += [one for one in answer.judgements if one.answer is Answer.UNKNOWN and one.kind in _MISSION]
+        blind += [one for one in answer.judgements if one.answer is Answer.UNKNOWN and one.needs_end]
     if blind:
         return Outcome.UNRESOLVED, "; ".join(f"{one.kind}: {one.reason}" for one in blind)
     return Outcome.SAFE, ""
@@ -197,7 +197,4 @@ def outcome_of(answer: Glimpse, setting: Setting) -> tuple[Outcome, str]:
 
 def could_not_tell(judgements: Sequence[Judgement]) -> list[Judgement]:
     """What oracles could not tell, whose rules hold all along a drive, however early it ends."""
-    return [one for one in judgements if one.answer is Answer.UNKNOWN and one.kind not in _MISSION]
-
-
-_MISSION = ("destination", "no_progress")  # an oracle of these cannot tell of a run stopped early: no reason for doubt
+    return [one for one in judgements if one.answer is Answer.UNKNOWN and not one.needs_end]

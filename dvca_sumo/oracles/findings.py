@@ -59,8 +59,9 @@ class Findings:
         """
         if self._found:
             found = tuple(sorted(self._found, key=lambda violation: violation.time))
-            return Judgement(kind=self._kind, answer=Answer.VIOLATED, violations=found)
+            return self._judged(Answer.VIOLATED, violations=found)
         reason = "nothing was observed" if self._places.is_empty else blind
-        if reason:
-            return Judgement(kind=self._kind, answer=Answer.UNKNOWN, reason=reason)
-        return Judgement(kind=self._kind, answer=Answer.KEPT)
+        return self._judged(Answer.UNKNOWN, reason=reason) if reason else self._judged(Answer.KEPT)
+
+    def _judged(self, answer: Answer, violations: tuple[Violation, ...] = (), reason: str = "") -> Judgement:
+        return Judgement(self._kind, answer, violations, reason, needs_end=self._category is Category.MISSION)

@@ -134,8 +134,8 @@ def glimpse(*violations: Violation, steps: int = 0, judgements: Sequence[Judgeme
     )
 
 
-def unknown(kind: str) -> Judgement:
-    return Judgement(kind, Answer.UNKNOWN, reason="it was dark")
+def unknown(kind: str, *, needs_end: bool = False) -> Judgement:
+    return Judgement(kind, Answer.UNKNOWN, reason="it was dark", needs_end=needs_end)
 
 
 SAFE = glimpse()

@@ -1,6 +1,7 @@
 import pickle
 from typing import cast
 
+import pytest
 from oracle_scenes import BareMap, car, drive, stop_line, straight_road
 
 from dvca_sumo.messages import SignalColour
@@ -35,6 +36,12 @@ def test_one_run_is_judged_by_every_oracle() -> None:
     assert violated == {"collision", "ttc", "speed_limit", "red_light", "stop_line"}
     assert answers["lane_departure"] is Answer.KEPT
     assert answers["destination"] is answers["no_progress"] is Answer.UNKNOWN
+
+
+@pytest.mark.parametrize("moments", [reckless(), reckless()[:2], []], ids=["violating", "short", "none"])
+def test_only_the_oracles_of_missions_need_the_end_of_a_drive(moments: list[Moment]) -> None:
+    found = judge(moments, judges(Places(ROUTE, ROADMAP), Thresholds()), Ending.CUT)
+    assert [judgement.kind for judgement in found if judgement.needs_end] == ["destination", "no_progress"]
 
 
 def test_every_violation_is_returned_once_and_kept_in_the_judgement() -> None:
