@@ -12,6 +12,7 @@ import msgspec
 from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Engine, Glimpse
+from dvca_sumo.geometry.randomness import key_of
 from dvca_sumo.interventions import Fault, Futures, Ideal, Selection, State
 from dvca_sumo.messages import Component
 from dvca_sumo.record import TICK, MessageMark
@@ -58,7 +59,7 @@ class Setting(msgspec.Struct, frozen=True):
     stop: StopRule  # a probe without a violation up to there is safe
     start: float  # [s] the ego's departure
     is_mission: bool  # the factual violation is one that only a finished drive can answer
-    jitters: tuple[int | None, ...]  # one run of each question for each; (None,) in exact mode
+    jitters: tuple[int | None, ...]  # numbers of the runs of each question; (None,) in exact mode
     untold: tuple[str, ...] = ()  # oracles that could not tell of the factual run: no probe is held to what they say
 
 
@@ -96,7 +97,7 @@ class Dtest:
         for question in questions:
             asked.setdefault(self._run(question), question)
         new = [question for run, question in asked.items() if run not in self._answers]
-        runs = [(question, jitter) for question in new for jitter in self._setting.jitters]
+        runs = [(question, self._drawn(question, number)) for question in new for number in self._setting.jitters]
         first = self._first_id + len(self.probes)
 
         heard: dict[int, Probe] = {}
@@ -135,6 +136,12 @@ class Dtest:
     def _run(self, question: Question) -> _Run:
         """What is run for a question: asked in other words, it is the same one."""
         return question.ideal, self._selection(question.since)
+
+    def _drawn(self, question: Question, number: int | None) -> int | None:
+        """Which schedule and noise a run of a question has: others than any other run, whatever was asked before."""
+        if number is None:
+            return None
+        return key_of(msgspec.json.encode((self._run(question), number)).decode())
 
     def _task(self, question: Question, jitter: int | None) -> Task:
         ideals = [Ideal(component, self._selection(question.since)) for component in question.ideal]
