@@ -111,6 +111,37 @@ def scribbling_planning(context: StackContext) -> Stack:
     return replace(stack, planning=Scribbling(stack.planning))
 
 
+class Altering:
+    """A component whose answers are altered."""
+
+    def __init__(self, component: Any, alter: Callable[[Any], Any]) -> None:
+        self._component, self._alter = component, alter
+
+    def step(self, *inputs: Any) -> Any:
+        return self._alter(self._component.step(*inputs))
+
+
+def altered(context: StackContext, component: str, alter: Callable[[Any], Any]) -> Stack:
+    stack = reference_stack(context)
+    return replace(stack, **{component: Altering(getattr(stack, component), alter)})  # type: ignore[arg-type]
+
+
+def reshaped(component: str, **arrays: Any) -> Callable[[StackContext], Stack]:
+    return partial(altered, component=component, alter=lambda said: msgspec.structs.replace(said, **arrays))
+
+
+flat_boxes = reshaped("perception", boxes=np.zeros((0, 4)))
+listed_velocities = reshaped("perception", velocities=[])
+brief_poses = reshaped("prediction", poses=np.zeros((0, 3, 3)))
+unnamed_lanes = reshaped("prediction", lanes=((),))
+short_points = reshaped("planning", points=np.zeros((80, 7)))
+hasty_points = partial(
+    altered,
+    component="planning",
+    alter=lambda plan: msgspec.structs.replace(plan, points=plan.points * [2.0, *[1.0] * 6]),
+)
+
+
 def crashing_by_seed(context: StackContext) -> Stack:
     """Crashes the process when the seed is `CRASHING_SEED`."""
     return spoilt(context, "planning", 5, _crash) if context.seed == CRASHING_SEED else reference_stack(context)

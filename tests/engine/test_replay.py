@@ -1,5 +1,6 @@
 """The replay engine: records, glimpses, and what a user reads when a run cannot be made."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -104,6 +105,23 @@ def test_a_component_that_raises_is_named_with_its_cycle_and_words(
 )
 def test_a_component_that_answers_with_nonsense_is_named(tmp_path: Path, street: Path, stack: str, words: str) -> None:
     with pytest.raises(StackError, match=rf"{words} {RAISING_CYCLE}\b"):
+        driven(scenario_file(tmp_path, street), stack=f"small_stacks:{stack}")
+
+
+@pytest.mark.parametrize(
+    ("stack", "words"),
+    [
+        ("flat_boxes", "perception raised ValueError: the shape of its boxes is (0, 4), and must be (0, 5) in cycle 0"),
+        ("listed_velocities", "the shape of its velocities is that of a list, and must be (0, 2)"),
+        ("brief_poses", "prediction raised ValueError: the shape of its poses is (0, 3, 3), and must be (0, 25, 3)"),
+        ("unnamed_lanes", "the shape of its lanes is (1,), and must be (0,)"),
+        ("short_points", "planning raised ValueError: the shape of its points is (80, 7), and must be (81, 7)"),
+        ("hasty_points", "the times of its points are up to 8 s off, and must be TRAJECTORY_TIMES"),
+    ],
+)
+def test_an_answer_of_another_shape_is_named(tmp_path: Path, street: Path, stack: str, words: str) -> None:
+    """Whoever reads it next would fail in its place."""
+    with pytest.raises(StackError, match=re.escape(words)):
         driven(scenario_file(tmp_path, street), stack=f"small_stacks:{stack}")
 
 
