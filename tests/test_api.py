@@ -1,9 +1,10 @@
 """The same as the command, in three calls from Python."""
 
+import json
 from pathlib import Path
 
 import pytest
-from command_line import typed
+from command_line import loaded, typed
 from small_scenarios import scenario_file
 
 import dvca_sumo
@@ -11,8 +12,10 @@ from dvca_sumo.analysis.attribution import Attribution, Progress
 from dvca_sumo.analysis.components import Verdict
 from dvca_sumo.analysis.dtest import Probe
 from dvca_sumo.api import FactualDrive
-from dvca_sumo.interventions import FaultError
+from dvca_sumo.interventions import FaultError, fault_library, library
 from dvca_sumo.messages import Component
+from dvca_sumo.report.result import Timing, result_of
+from dvca_sumo.report.terminal import verdict_text
 from dvca_sumo.scenario import ScenarioError
 from dvca_sumo.stack.reference import StackError
 
@@ -71,6 +74,28 @@ def test_a_clean_drive_has_nothing_to_explain(tmp_path: Path, street: Path) -> N
     assert scenario.seed == 3
     answer = dvca_sumo.attribute(dvca_sumo.drive(scenario))
     assert (answer.verdict, answer.violation, answer.probes, answer.planted) == (Verdict.NONE, None, (), None)
+
+
+@pytest.mark.parametrize("silent", [("localization",), ("control",), ("localization", "control")], ids="+".join)
+def test_components_that_put_out_nothing_from_the_start_are_explained_as_any_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, silent: tuple[str, ...]
+) -> None:
+    for component in silent:
+        text = f'component = "{component}"\neffect = "publish_nothing"\nsummary = "Nothing is published."\n'
+        (tmp_path / f"{component}.none.toml").write_text(text, encoding="utf-8")
+    monkeypatch.setattr(library, "folder", lambda _: tmp_path)
+    fault_library.cache_clear()
+    try:
+        drive = dvca_sumo.drive(dvca_sumo.load_scenario("nets/cs1.sumocfg"), [f"{name}.none" for name in silent])
+    finally:
+        fault_library.cache_clear()
+    answer = dvca_sumo.attribute(drive)
+    timing = Timing(factual_wall_s=0.5, attribution_wall_s=2.0, engine="fork", jobs=2)
+    result = loaded(json.dumps(result_of(drive.request, drive.source, answer, timing)))
+    assert "VIOLATION" in verdict_text(answer, timing)
+    assert answer.is_reproducible
+    assert answer.record.executions[Component.PLANNING] == [] or "localization" not in silent
+    assert result["component"] == (silent[0] if len(silent) == 1 else None)
 
 
 def test_a_built_in_scenario_is_found_from_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -95,6 +95,18 @@ def test_a_component_whose_messages_are_lost_from_the_start_gives_its_successors
     assert record.executions[Component.CONTROL][0].tick == 0
 
 
+@pytest.mark.parametrize("silent", [Component.LOCALIZATION, Component.CONTROL])
+def test_until_there_is_a_command_the_ego_rolls_straight_on(config: Path, silent: Component) -> None:
+    record = driven(config, Fault("lost", silent, "publish_nothing", {}, Selection(end=2.0)))
+    rolling, begin = record.path[:200], record.path[0]
+    assert {(ego.speed, ego.y, ego.heading, ego.steering) for ego in rolling} == {
+        (begin.speed, begin.y, begin.heading, 0.0)
+    }
+    first = next(one for one in record.executions[Component.CONTROL] if one.message is not None)
+    assert first.tick == 200
+    assert record.path[-1].speed == 0.0
+
+
 def test_a_fault_within_an_ideal_component_alters_nothing_that_is_published(config: Path) -> None:
     fault = planted_fault("localization.lateral:left=2.0")
     record = driven(config, fault, Ideal(Component.LOCALIZATION))
