@@ -1,11 +1,13 @@
 """A user's sumocfg: which files it reads, which options it sets, which outputs it asks for."""
 
+import contextlib
 import difflib
 import hashlib
 import math
 import os
 import re
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -111,7 +113,7 @@ def read_configuration(path: Path) -> Configuration:
     """Read a sumocfg.
 
     Raises:
-        ScenarioError: The file, or one that it names, is missing or is not XML, or it cannot be run
+        ScenarioError: The file, or one that it names, is missing, cannot be read or is not XML, or it cannot be run
             by this tool (mesoscopic model, nothing but its options saved).
     """
     path = path.resolve()
@@ -119,10 +121,11 @@ def read_configuration(path: Path) -> Configuration:
         raise ScenarioError(f"{path} is a folder, not a SUMO configuration")
     if not path.is_file():
         raise ScenarioError(f"no such SUMO configuration: {path}{_nearest(path)}")
-    try:
-        root = ET.parse(path).getroot()  # noqa: S314 - the user's own file, read as SUMO itself reads it
-    except (ET.ParseError, LookupError, ValueError) as error:  # the latter two of a foreign encoding
-        raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
+    with _reading(path):
+        try:
+            root = ET.parse(path).getroot()  # noqa: S314 - the user's own file, read as SUMO itself reads it
+        except (ET.ParseError, LookupError, ValueError) as error:  # the latter two of a foreign encoding
+            raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
     options: dict[str, str] = {}
     for element in root.iter():
         value = element.get("value", element.get("v"))
@@ -150,9 +153,22 @@ def _of_environment(name: re.Match[str]) -> str:
 
 
 def content_of(path: Path) -> str:
-    """Digest of a file's bytes."""
-    status = path.stat()
-    return _content(path, status.st_size, status.st_mtime_ns)
+    """Digest of a file's bytes.
+
+    Raises:
+        ScenarioError: The file cannot be read.
+    """
+    with _reading(path):
+        status = path.stat()
+        return _content(path, status.st_size, status.st_mtime_ns)
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise ScenarioError(f"{path} cannot be read: {error.strerror}") from None
 
 
 def _is_file(path: Path) -> bool:
@@ -163,7 +179,8 @@ def _is_file(path: Path) -> bool:
 
 
 def _read_by(path: Path) -> tuple[Path, ...]:
-    status = path.stat()
+    with _reading(path):
+        status = path.stat()
     return _files_read(path, status.st_size, status.st_mtime_ns)
 
 

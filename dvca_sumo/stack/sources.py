@@ -37,7 +37,11 @@ def stack_factory(source: StackSource) -> StackFactory:
     if source.is_reference:
         config = StackConfig() if stack is None else _config(Path(stack))
         build = config if bug is None else build_with(bug, config)
-        return lambda context: reference_stack(context, build)
+
+        def factory(context: StackContext) -> Stack:
+            return reference_stack(context, build)
+
+        return factory if stack is None else built_checked(stack, factory, "stack file")
     assert stack is not None  # or it would be the reference stack
     if bug is not None:
         raise BugError(f"bug {bug!r} is a switch of the reference stack; {stack!r} has none")
@@ -76,16 +80,16 @@ def files_of(source: StackSource) -> dict[str, Path]:
     return {path.relative_to(root).as_posix(): path for path in beside}
 
 
-def built_checked(source: str, factory: StackFactory) -> StackFactory:
-    """`factory`, whose failures and wrong results are named as its own."""
+def built_checked(source: str, factory: StackFactory, kind: str = "stack factory") -> StackFactory:
+    """`factory`, whose failures and wrong results are named as those of `source`, a `kind`."""
 
     def build(context: StackContext) -> Stack:
         try:
             stack = factory(context)
         except (Exception, SystemExit) as error:
-            raise StackError(f"stack factory {source!r} raised {_said(error)}") from error
+            raise StackError(f"{kind} {source!r} raised {_said(error)}") from error
         if not isinstance(stack, Stack):
-            raise StackError(f"stack factory {source!r} returned {type(stack).__name__}, not a Stack")
+            raise StackError(f"{kind} {source!r} returned {type(stack).__name__}, not a Stack")
         return stack
 
     return build

@@ -30,6 +30,10 @@ BAD_FILES = {
     "unknown component": ("[brain]\nsize = 2\n", ("brain",)),
     "wrong type": ('[planning]\nacceleration = "fast"\n', ("`str`", "$.planning.acceleration")),
     "range that is none": ("[sensors]\nfar_range = -5\n", ("far_range is -5", "allowed: 0.1 or more", "$.sensors")),
+    "value that the stack cannot be built with": (
+        "[localization]\nlargest_steering = inf\n",
+        ("stack file 'mine.toml' raised ",),
+    ),
     "no TOML": ("planning: fast\n", ("line 1",)),
 }
 

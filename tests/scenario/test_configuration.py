@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,9 @@ import sumolib
 from small_scenarios import scenario_file
 
 from dvca_sumo.scenario import ScenarioError
-from dvca_sumo.scenario.configuration import OUTPUTS, SYNONYMS, read_configuration, seconds
+from dvca_sumo.scenario.configuration import OUTPUTS, SYNONYMS, content_of, read_configuration, seconds
+
+UNREADABLE = Path("/proc/self/mem")  # by anybody: nothing lies at its beginning
 
 # Options this tool reads or overrides, beside those that make SUMO write a file.
 LOOKED_AT = {
@@ -172,6 +175,20 @@ def test_a_configuration_that_is_not_xml_is_refused(tmp_path: Path, text: str) -
     config.write_text(text)
     with pytest.raises(ScenarioError, match=r"run\.sumocfg is not well-formed XML"):
         read_configuration(config)
+
+
+@pytest.mark.skipif(not UNREADABLE.exists(), reason="no file that nobody can read")
+@pytest.mark.parametrize("read", [read_configuration, content_of])
+def test_a_file_that_cannot_be_read_is_named_with_the_reason(read: Callable[[Path], object]) -> None:
+    with pytest.raises(ScenarioError, match=r"^/proc/\S+/mem cannot be read: Input/output error$"):
+        read(UNREADABLE)
+
+
+def test_contents_of_a_file_that_is_gone_are_refused(tmp_path: Path, net: Path) -> None:
+    configuration = read_configuration(scenario_file(tmp_path, net))
+    net.unlink()
+    with pytest.raises(ScenarioError, match=r"some\.net\.xml cannot be read: No such file or directory"):
+        _ = configuration.contents
 
 
 def test_another_kind_of_xml_is_refused(tmp_path: Path, net: Path) -> None:
