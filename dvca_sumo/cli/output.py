@@ -1,7 +1,9 @@
 """What every command says and writes, and how it ends."""
 
 import contextlib
+import io
 import os
+import sys
 import tempfile
 from collections.abc import Mapping
 from enum import IntEnum
@@ -72,7 +74,7 @@ def deliver(text: str, files: Mapping[Path, str]) -> None:
     for path, content in files.items():
         draft = path.with_suffix(".part")
         try:
-            draft.write_text(content)
+            draft.write_text(content, encoding="utf-8")
             draft.replace(path)
         except OSError as error:
             lost.append(f"{path}: {error.strerror}")
@@ -87,7 +89,10 @@ def deliver(text: str, files: Mapping[Path, str]) -> None:
 
 def _printed(text: str, *, is_error: bool = False) -> OSError | None:
     """Prints; returns why it could not. After that nothing more is printed there, and nothing fails for it."""
+    stream = sys.stderr if is_error else sys.stdout
     try:
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # not every terminal has the characters of every id
         click.echo(text, err=is_error)
     except OSError as error:
         null = os.open(os.devnull, os.O_WRONLY)

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -115,6 +116,18 @@ def test_what_cannot_be_written_is_printed_all_the_same(tmp_path: Path, scenario
     assert said.result["verdict"] == "none"
     assert said.err.splitlines()[-1] == f"error: cannot write {tmp_path}/out/result.json: Is a directory"
     assert said.code == ExitCode.BAD_INPUT
+
+
+def test_characters_that_a_terminal_lacks_lose_nothing(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    words = "caf\xe9 \u2192"
+    code = f"from dvca_sumo.cli.output import *; tell({words!a}); deliver({words!a}, {{Path('{page}'): {words!a}}})"
+    poor = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0", "PYTHONIOENCODING": "latin-1:strict"}
+    said = subprocess.run(  # noqa: S603 our own code
+        [sys.executable, "-c", code], capture_output=True, env=environment() | poor, check=True
+    )
+    assert said.stdout == said.stderr == b"caf\xe9 \\u2192\n"
+    assert page.read_text(encoding="utf-8") == words
 
 
 @pytest.mark.parametrize("is_all_unread", [False, True], ids=["| true", "2>&1 | true"])

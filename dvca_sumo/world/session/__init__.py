@@ -59,7 +59,8 @@ class Session:
         types.write_text(
             f'<additional><vType id="{NEVER_TELEPORTED}" timeToTeleport="-1"/>'
             f'<vType id="{SHADOW}" vClass="ignoring" timeToTeleport="-1" emergencyDecel="{ANY_BRAKING:g}"/>'
-            "</additional>"
+            "</additional>",
+            encoding="utf-8",
         )
         files = input_words(scenario.configuration, folder, types)
         try:
