@@ -30,6 +30,7 @@ from dvca_sumo.scenario import load_scenario as _load_scenario
 from dvca_sumo.stack.sources import StackSource
 
 CPUS = os.cpu_count() or 1
+REPEATS = 3  # of each question in jitter mode, unless others are asked for
 ENGINES: dict[str, type[ForkEngine] | type[ReplayEngine]] = {"fork": ForkEngine, "replay": ReplayEngine}
 DEFAULT_ENGINE = "fork" if IS_AVAILABLE else "replay"
 

@@ -10,6 +10,7 @@ from typing import Literal
 
 import msgspec
 
+from dvca_sumo.api import REPEATS
 from dvca_sumo.messages import Component
 
 Suite = Literal["injected", "real-bugs", "random"]
@@ -44,13 +45,15 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """The same for jitter mode: a fault's window is longer at either end by what phases and noise shift a drive."""
         return msgspec.structs.replace(self, fault=_loosened(self.fault))
 
-    def command(self, seed: int | None, *, has_jitter: bool) -> str:
-        """What to type to see this case alone; `seed` None: the scenario's own."""
+    def command(self, seed: int | None, repeats: int | None) -> str:
+        """What to type to see this case alone; `seed` None: the scenario's own; `repeats` None: exact mode."""
         words = ["dvca-sumo", "run", self.scenario, *([] if seed is None else ["--seed", str(seed)])]
         for option, value in (("--fault", self.fault), ("--bug", self.bug), ("--ego", self.ego)):
             words += [option, value] if value else []
         words += ["--begin", f"{self.begin:g}"] if self.begin is not None else []
-        return shlex.join([*words, "--jitter"] if has_jitter else words)
+        words += ["--jitter"] if repeats is not None else []
+        words += ["--repeats", str(repeats)] if repeats not in (None, REPEATS) else []
+        return shlex.join(words)
 
 
 def injected_cases() -> tuple[Case, ...]:

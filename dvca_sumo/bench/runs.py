@@ -15,7 +15,7 @@ from dvca_sumo.bench.baselines.scoring import baseline_scores, no_violation
 from dvca_sumo.bench.cases import Case
 from dvca_sumo.bench.ground_truth import altered_messages
 from dvca_sumo.bench.proof import is_proven
-from dvca_sumo.bench.score import BaselineScore, Controls, Mode, Score, failed, scored
+from dvca_sumo.bench.score import BaselineScore, Controls, Mode, Score, failed, mode_of, scored
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.record import Record
 from dvca_sumo.violations import Answer
@@ -37,7 +37,7 @@ class Setting(msgspec.Struct, frozen=True):
     @property
     def mode(self) -> Mode:
         """Its name."""
-        return "exact" if self.repeats is None else "jitter"
+        return mode_of(self.repeats)
 
 
 def analysed(cases: Iterable[Case], setting: Setting, jobs: int) -> Iterator[tuple[int, Score]]:
@@ -54,7 +54,7 @@ def analysed(cases: Iterable[Case], setting: Setting, jobs: int) -> Iterator[tup
 
     for row, answer in isolated(work(), jobs, TIMEOUT):
         if isinstance(answer, Failure):
-            yield row, failed(begun[row], setting.mode, setting.seed, answer.reason)
+            yield row, failed(begun[row], setting.repeats, setting.seed, answer.reason)
         else:
             yield row, answer
 
@@ -85,7 +85,7 @@ def judged(
         case,
         found,
         altered,
-        mode=setting.mode,
+        repeats=setting.repeats,
         seed=drive.request.scenario.seed,
         walls=walls,
         is_proven=is_proven(drive, found) if is_exact else None,

@@ -74,7 +74,7 @@ def scored(
     found: Attribution,
     altered: tuple[int, ...],
     *,
-    mode: Mode,
+    repeats: int | None,
     seed: int,
     walls: tuple[float, float],
     is_proven: bool | None,
@@ -87,7 +87,7 @@ def scored(
         case: What was analysed.
         found: The answer.
         altered: Indices of the expected component's messages that the defect changed.
-        mode: How it was run.
+        repeats: Runs of each question in jitter mode; None: it was run in exact mode.
         seed: Of the scenario.
         walls: [s] of the factual run, of the attribution.
         is_proven: See `Score`.
@@ -100,7 +100,7 @@ def scored(
     is_message_right = is_right and found.message is not None and found.message.index in altered
     counts = record.message_counts
     return msgspec.structs.replace(
-        failed(case, mode, seed, found.reason),
+        failed(case, repeats, seed, found.reason),
         component=None if named is None else named.value,
         component_success=is_right,
         message_success=is_message_right,
@@ -120,13 +120,13 @@ def scored(
     )
 
 
-def failed(case: Case, mode: Mode, seed: int | None, reason: str) -> Score:
+def failed(case: Case, repeats: int | None, seed: int | None, reason: str) -> Score:
     """The score of a case that could not be analysed: no success of any kind."""
     return Score(
         suite=case.suite,
         name=case.name,
         scenario=case.scenario,
-        mode=mode,
+        mode=mode_of(repeats),
         seed=seed,
         expected_component=case.component.value,
         component=None,
@@ -145,8 +145,13 @@ def failed(case: Case, mode: Mode, seed: int | None, reason: str) -> Score:
         reason=reason,
         is_proven=None,
         controls=None,
-        command=case.command(seed, has_jitter=mode == "jitter"),
+        command=case.command(seed, repeats),
     )
+
+
+def mode_of(repeats: int | None) -> Mode:
+    """The mode with so many runs of each question; None: without any repeats."""
+    return "exact" if repeats is None else "jitter"
 
 
 def distance(record: Record, message: MessageMark | None, altered: tuple[int, ...]) -> float | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import msgspec
 
-from dvca_sumo.api import CPUS
+from dvca_sumo.api import CPUS, REPEATS
 from dvca_sumo.bench.baselines import BASELINES, available_baselines
 from dvca_sumo.bench.benchmark import run_benchmark
 from dvca_sumo.bench.cases import WRITTEN
@@ -19,7 +19,6 @@ from dvca_sumo.bench.runs import Setting
 from dvca_sumo.bench.score import Score
 from dvca_sumo.bench.tables import Gap, json_of, markdown_page, summaries, terminal_text
 from dvca_sumo.cli.output import Folder, deliver, make_folder, tell
-from dvca_sumo.cli.running import REPEATS
 from dvca_sumo.store import Store
 
 

@@ -11,14 +11,13 @@ from dvca_sumo import api
 from dvca_sumo.analysis.attribution import Attribution, AttributionStoppedError, Progress
 from dvca_sumo.analysis.components import Verdict
 from dvca_sumo.analysis.dtest import Probe
-from dvca_sumo.api import CPUS, FactualDrive, load_scenario
+from dvca_sumo.api import CPUS, REPEATS, FactualDrive, load_scenario
 from dvca_sumo.cli.output import ExitCode, Folder, deliver, make_folder, tell
 from dvca_sumo.record import Record
 from dvca_sumo.report.result import Timing, result_of
 from dvca_sumo.report.terminal import verdict_text
 from dvca_sumo.stack.sources import StackSource
 
-REPEATS = 3  # of each question in jitter mode
 PARTIAL = "result.partial.json"  # of an interrupted analysis
 
 

@@ -9,6 +9,7 @@ import pytest
 from small_scenarios import scenario_file
 
 from bench.scores import score
+from dvca_sumo.api import REPEATS
 from dvca_sumo.bench import benchmark
 from dvca_sumo.bench.benchmark import run_benchmark
 from dvca_sumo.bench.cases import Case, injected_cases, real_bug_cases
@@ -103,6 +104,16 @@ def test_a_case_that_cannot_be_run_is_no_success_and_says_why() -> None:
     assert not found.component_success
     assert "none.sumocfg" in found.reason
     assert found.command == "dvca-sumo run nets/none.sumocfg --fault control.lateral"
+
+
+@pytest.mark.parametrize(
+    ("repeats", "words"), [(None, ""), (REPEATS, " --jitter"), (REPEATS + 2, f" --jitter --repeats {REPEATS + 2}")]
+)
+def test_the_command_that_shows_a_case_repeats_as_often(repeats: int | None, words: str) -> None:
+    broken = Case("injected", "x", "nets/none.sumocfg", Component.CONTROL, fault="control.lateral")
+    ((_, found),) = analysed([broken], Setting(repeats=repeats), 1)
+    assert found.command == f"dvca-sumo run nets/none.sumocfg --fault control.lateral{words}"
+    assert found.mode == ("exact" if repeats is None else "jitter")
 
 
 @pytest.mark.parametrize("form", ["text", "json"])

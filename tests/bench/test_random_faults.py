@@ -82,7 +82,7 @@ def _canned(monkeypatch: pytest.MonkeyPatch, violating: Callable[[int], bool], a
             for row, case in reversed(group):
                 number = int(case.name.rpartition("#")[2])
                 asked.append(number)
-                score = msgspec.structs.replace(failed(case, "exact", 0, ""), verdict="component", altered_share=0.5)
+                score = msgspec.structs.replace(failed(case, None, 0, ""), verdict="component", altered_share=0.5)
                 yield row, msgspec.structs.replace(score, violation="collision" if violating(number) else None)
             if len(group) < at_once:
                 return
@@ -136,7 +136,7 @@ def test_what_is_told_is_all_of_it_only_when_drawing_is_over(
 
 
 def test_a_draw_that_could_not_be_run_is_a_case_and_wrong() -> None:
-    score = failed(drawn_case(1, 0, DRIVES), "exact", 0, "the process died of SIGSEGV")
+    score = failed(drawn_case(1, 0, DRIVES), None, 0, "the process died of SIGSEGV")
     assert is_violating(score)
     assert not score.component_success
 
