@@ -1,6 +1,5 @@
 """Attribution of a driving violation: Algorithm 1 with its premise, every step kept as evidence."""
 
-import math
 from collections.abc import Iterator, Sequence
 
 import msgspec
@@ -64,7 +63,7 @@ class Attribution(msgspec.Struct, frozen=True):
     verdict: Verdict
     is_reproducible: bool
     reason: str
-    until: float  # [s] see Setting
+    stop: StopRule  # of the probes, see Setting
     at_fault: tuple[Judged, ...] = ()  # whose doing violations of the record are, of those where that is known
     components: ComponentAnswer | None = None
     messages: MessageAnswer | None = None
@@ -151,7 +150,7 @@ def explain(
         found = replace(found, at_fault=at_fault(record, engine.roadmap))
         setting = setting_of(request, record, principal(record.violations))
         asked.append(Dtest(engine, setting, progress.probe))
-        found = replace(found, until=setting.stop.at)
+        found = replace(found, stop=setting.stop)
         for answer in _steps(found, engine, asked[0], request, from_start=from_start):
             found = answer
         is_answered = True
@@ -174,8 +173,9 @@ def unexplained(record: Record) -> Attribution:
     doubts = _doubts(record)
     if not record.violations:
         verdict = Verdict.UNRESOLVED if doubts else Verdict.NONE
-        return Attribution(record, record.digest, None, verdict, True, doubts, math.inf)
-    return Attribution(record, record.digest, principal(record.violations), Verdict.UNRESOLVED, True, doubts, math.inf)
+        return Attribution(record, record.digest, None, verdict, True, doubts, StopRule())
+    first = principal(record.violations)
+    return Attribution(record, record.digest, first, Verdict.UNRESOLVED, True, doubts, StopRule())
 
 
 def attribute(engine: Engine, request: Request, progress: Progress) -> Attribution:
@@ -266,7 +266,7 @@ def _decided(found: Attribution, dtest: Dtest, engine: Engine, *, is_exact: bool
     assert answer is not None  # the caller has it
     assert violation is not None
     try:
-        component, messages = decisive(dtest, record, answer, violation.time, found.until, is_exact=is_exact)
+        component, messages = decisive(dtest, record, answer, violation.time, found.stop.at, is_exact=is_exact)
         has_luck = is_by_luck(dtest, record, component, messages, violation.time)
     except UndecidedError as error:
         answer = undecided(answer, str(error))

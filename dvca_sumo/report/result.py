@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 import msgspec
 
-from dvca_sumo.analysis.attribution import Attribution, Request
+from dvca_sumo.analysis.attribution import PAST, Attribution, Request
 from dvca_sumo.analysis.dtest import Probe
 from dvca_sumo.analysis.planted import Planted
 from dvca_sumo.interventions import Fault
@@ -76,7 +76,9 @@ def result_of(request: Request, source: StackSource, found: Attribution, timing:
         "reduction_rate": 1.0 - 1.0 / total if has_message else 0.0,
         "planted": None if found.planted is None else _planted(found.planted),
         "certificate": _certificate(found),
-        "settled_at": _finite(found.until),
+        "settled_at": _finite(found.stop.at),
+        "settled_from": _finite(found.stop.settled),
+        "settled_past": PAST if math.isfinite(found.stop.settled) else None,
         "timing": {
             **msgspec.to_builtins(timing),
             "ratio": timing.attribution_wall_s / timing.factual_wall_s,

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 
-from dvca_sumo.analysis.attribution import Attribution
+from dvca_sumo.analysis.attribution import PAST, Attribution
 from dvca_sumo.analysis.bisection import Outcome
 from dvca_sumo.analysis.components import Verdict
 from dvca_sumo.analysis.dtest import Probe
@@ -181,7 +181,9 @@ def _cost(found: Attribution, timing: Timing) -> str:
     probes = len(found.probes)
     if probes == 0:
         return f"\n1 run, {timing.factual_wall_s:.1f} s"
-    settled = f", safe means: none until {found.until:.1f} s" if math.isfinite(found.until) else ""
+    settled, stop = "", found.stop
+    if math.isfinite(stop.at):
+        settled = f", safe means: none until {stop.at:.1f} s, or {stop.settled:.1f} s once {PAST:g} m past the place"
     total = timing.factual_wall_s + timing.attribution_wall_s
     jobs = "1 job" if timing.jobs == 1 else f"{timing.jobs} jobs"
     return f"\n1 + {probes} runs, {total:.1f} s with {jobs}, engine {timing.engine}{settled}"

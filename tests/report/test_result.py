@@ -26,7 +26,7 @@ from analysis.scenes import (
 )
 from msgspec.structs import replace
 
-from dvca_sumo.analysis.attribution import Attribution, AttributionStoppedError, Request
+from dvca_sumo.analysis.attribution import LEAST_SETTLE, PAST, SETTLE, Attribution, AttributionStoppedError, Request
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.interventions import Fault, planted_fault
 from dvca_sumo.messages import COMPONENTS, Component
@@ -145,6 +145,12 @@ def test_whose_doing_a_violation_is_is_told(violation: Violation, fault: str | N
         assert (one["fault"], one["reason"]) == (fault, reason)
 
 
+def test_when_a_probe_is_safe_is_told() -> None:
+    result = perception_missed()
+    settled = (result["settled_at"], result["settled_from"], result["settled_past"])
+    assert settled == (HIT.time + SETTLE, HIT.time + LEAST_SETTLE, PAST)
+
+
 def test_nothing_to_explain() -> None:
     result = told(attributed(drive(), lambda _: SAFE))
     assert (result["verdict"], result["component"], result["message"]) == ("none", None, None)
@@ -241,8 +247,14 @@ def test_unresolved_where_an_oracle_could_not_judge_a_run_without_violation() ->
 
 
 def test_not_reproducible() -> None:
-    result = perception_missed(lambda _: CRASHED)
+    result = perception_missed(lambda _: glimpse(steps=44))
     assert (result["verdict"], result["component"], result["reproducible"]) == ("not_reproducible", None, False)
+    assert result["probes"][0]["outcome"] == "SAFE"
+
+
+def test_unresolved_where_the_repetition_could_not_be_told() -> None:
+    result = perception_missed(lambda _: CRASHED)
+    assert (result["verdict"], result["component"], result["reproducible"]) == ("unresolved", None, True)
     assert result["probes"][0]["outcome"] == "UNRESOLVED"
     assert "boom" in result["probes"][0]["reason"]
     assert result["probes"][0]["digest"] is None
@@ -289,7 +301,7 @@ def test_endless_limits_are_null() -> None:
         result_of(Request(replace(SCENARIO, end=math.inf)), StackSource(), found, TIMING), allow_nan=False
     )
     result = json.loads(text)
-    assert result["settled_at"] is None
+    assert result["settled_at"] is result["settled_from"] is result["settled_past"] is None
     assert result["scenario"]["end"] is None
     assert result["scenario"]["thresholds"]["no_progress_time"] is None
     assert result["scenario"]["thresholds"]["ttc"] is None

@@ -24,6 +24,7 @@ from analysis.scenes import (
 from msgspec.structs import replace
 
 from dvca_sumo.analysis.attribution import Attribution, unexplained
+from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Glimpse
 from dvca_sumo.messages import Component
 from dvca_sumo.oracles.destination import Destination
@@ -32,7 +33,7 @@ from dvca_sumo.report.terminal import verdict_text
 from dvca_sumo.run import Task
 from dvca_sumo.violations import Category, Contact, Ending, Violation
 
-PERCEPTION, PREDICTION = Component.PERCEPTION, Component.PREDICTION
+PERCEPTION, PREDICTION, CONTROL = Component.PERCEPTION, Component.PREDICTION, Component.CONTROL
 TIMING = Timing(factual_wall_s=0.5, attribution_wall_s=2.0, engine="fork", jobs=2)
 
 
@@ -239,17 +240,28 @@ def test_unresolved_names_no_component_and_no_message() -> None:
 def test_a_probe_that_could_not_be_told_is_shown_as_such() -> None:
     record = faulty_drive()
     answers = answering(record, {PERCEPTION: FATAL})
-    said = text(
-        attributed(record, lambda task: CRASHED if tuple(ideals(task)) == (Component.CONTROL,) else answers(task))
-    )
+
+    def crashing(task: Task) -> Glimpse | Failure:
+        substituted = ideals(task)
+        is_early = tuple(substituted) == (CONTROL,) and first_substituted(record, substituted[CONTROL]) < 10 * FATAL
+        return CRASHED if is_early else answers(task)
+
+    said = text(attributed(record, crashing))
     assert "could not be told" in line(said, "ideal control ")
     assert line(said, "COMPONENT").endswith("perception")
 
 
 def test_not_reproducible_says_why_and_names_nobody() -> None:
-    said = text(explained(lambda _: CRASHED))
+    said = text(explained(lambda _: glimpse(steps=44)))
     assert "not reproducible" in line(said, "COMPONENT")
-    assert "SIGSEGV" in line(said, "because")
+    assert "shows no violation" in line(said, "because")
+    assert "MESSAGE" not in said
+
+
+def test_a_repetition_that_could_not_be_told_says_so_and_names_nobody() -> None:
+    said = text(explained(lambda _: CRASHED))
+    assert line(said, "COMPONENT") == "COMPONENT  could not be told"
+    assert "the repeated run could not be told: killed by SIGSEGV" in line(said, "because")
     assert "MESSAGE" not in said
 
 
@@ -277,4 +289,10 @@ def test_a_certificate_is_told() -> None:
 def test_the_cost_is_told_in_runs_and_seconds() -> None:
     found = explained()
     last = text(found).splitlines()[-1]
+    assert last.endswith("safe means: none until 13.4 s, or 11.9 s once 10 m past the place")
     assert f"1 + {len(found.probes)} runs, 2.5 s with 2 jobs, engine fork" in last
+
+
+def test_no_place_is_named_where_a_safe_run_is_one_that_goes_on_to_its_end() -> None:
+    record = faulty_drive(breach("no_progress", Category.MISSION, START + 4.4))
+    assert "safe means" not in text(attributed(record, answering(record, {PERCEPTION: FATAL})))
