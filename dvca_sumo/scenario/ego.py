@@ -113,14 +113,14 @@ class Definitions:
 
 
 def _position(text: str, ego: str, length: float) -> float:
-    if text in ("max", "random"):
+    if text == "max":
         return length
     if text == "center":
         return 0.5 * length
     try:
         position = float(text)
-    except ValueError:
-        allowed = "metres, center, max, random"
+    except ValueError:  # "random": SUMO draws it, and tells nobody
+        allowed = "metres, center, max"
         raise ScenarioError(f"arrivalPos of {ego} is no position: {text!r} (allowed: {allowed})") from None
     return position + length if position < 0.0 else position
 

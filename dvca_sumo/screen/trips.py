@@ -9,7 +9,7 @@ import msgspec
 from dvca_sumo.engine.replay import roadmap
 from dvca_sumo.geometry.randomness import key_of, uniforms
 from dvca_sumo.roadmap import RouteError
-from dvca_sumo.run import Departing, free_flow, opened
+from dvca_sumo.run import Departing, free_flow, opened, patience
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.stack.reference import reference_stack
 from dvca_sumo.world import Entry, World
@@ -140,7 +140,9 @@ def _trip(entry: Entry, departing: Departing, durations: Mapping[str, float], en
     """The trip, or why it is none."""
     try:
         route = departing.route(entry)
-    except (RouteError, KeyError, ScenarioError):
+    except ScenarioError:
+        return "without a known destination"
+    except (RouteError, KeyError):
         return "without a drivable route"
     length = route.destination - route.start
     if length < SHORTEST:
@@ -148,9 +150,9 @@ def _trip(entry: Entry, departing: Departing, durations: Mapping[str, float], en
     freely = free_flow(route)
     usual = FREE_FLOW * freely
     expected = durations.get(entry.ego, usual if entry.stops else math.inf)
-    if entry.time + max(expected, usual) + MARGIN > end:
+    if math.isinf(expected) or entry.time + max(expected, usual) + MARGIN > end:
         return "not over before the end"
-    if entry.time + SLOWER * expected > departing.latest(entry, route):
+    if SLOWER * expected > patience(freely):
         return "held up for longer than an ego's patience"
     return Trip(entry.ego, entry.time, length, freely, expected)
 

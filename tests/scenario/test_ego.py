@@ -144,7 +144,6 @@ def test_a_marked_vehicle_in_a_file_that_is_not_xml_names_the_file(tmp_path: Pat
     [
         ("", 80.0),
         ('arrivalPos="max"', 80.0),
-        ('arrivalPos="random"', 80.0),
         ('arrivalPos="center"', 40.0),
         ('arrivalPos="-5.5"', 74.5),
         ('arrivalPos="-90"', 0.0),
@@ -166,9 +165,13 @@ def test_the_arrival_position_of_a_flow_is_that_of_its_vehicles(tmp_path: Path, 
     assert Definitions(read_configuration(config)).arrival_position("f.2", 80.0) == 12.0
 
 
-def test_an_arrival_position_that_is_none_is_refused(tmp_path: Path, net: Path) -> None:
-    config = scenario_file(tmp_path, net, '<vehicle id="ego" arrivalPos="middle"/>')
-    with pytest.raises(ScenarioError, match=r"arrivalPos of ego is no position: 'middle' \(allowed: metres, center"):
+@pytest.mark.parametrize("position", ["middle", "random"])
+def test_an_arrival_position_that_is_none_or_that_sumo_draws_is_refused(
+    tmp_path: Path, net: Path, position: str
+) -> None:
+    config = scenario_file(tmp_path, net, f'<vehicle id="ego" arrivalPos="{position}"/>')
+    says = rf"arrivalPos of ego is no position: '{position}' \(allowed: metres, center, max\)"
+    with pytest.raises(ScenarioError, match=says):
         Definitions(read_configuration(config)).arrival_position("ego", 80.0)
 
 

@@ -1,5 +1,6 @@
 """Which trips are drawn, and how they are shared out among simulations."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -7,8 +8,9 @@ import pytest
 from screen_scenes import TRAFFIC, draw, traffic
 
 from dvca_sumo.scenario import ScenarioError
+from dvca_sumo.screen import trips
 from dvca_sumo.screen.driving import planned
-from dvca_sumo.screen.trips import Trip
+from dvca_sumo.screen.trips import MARGIN, SLOWER, Trip
 
 FLOWS = "".join(
     f'<flow id="{start}{end}" from="{start}b" to="b{end}" begin="{begin}" period="10" number="12"/>'
@@ -35,8 +37,11 @@ def test_trips_of_a_hundred_metres_are_drawn_where_longer_ones_are_too_few(tmp_p
     assert found.refused == {"of class bus": 1}
 
 
-def test_a_trip_that_ends_where_sumo_alone_knows_is_not_drawn_and_the_others_are(tmp_path: Path, street: Path) -> None:
-    found = draw(traffic(tmp_path, street, TRAFFIC.replace('id="second"', 'id="second" arrivalEdge="random"')), 10)
+@pytest.mark.parametrize("arrival", ["arrivalEdge", "arrivalPos"])
+def test_a_trip_that_ends_where_sumo_alone_knows_is_not_drawn_and_the_others_are(
+    tmp_path: Path, street: Path, arrival: str
+) -> None:
+    found = draw(traffic(tmp_path, street, TRAFFIC.replace('id="second"', f'id="second" {arrival}="random"')), 10)
     assert [one.ego for one in found.trips] == ["first", "north", "east", "short", "stopping"]
     assert found.refused == {"of class bus": 1, "without a known destination": 1}
 
@@ -61,6 +66,32 @@ def test_a_trip_that_the_end_would_cut_is_not_drawn(tmp_path: Path, street: Path
     found = draw(traffic(tmp_path, street, end="120"), 10)
     assert 0 < len(found.trips) < 6
     assert found.refused["not over before the end"] == 6 - len(found.trips)
+
+
+def test_an_egos_patience_may_go_on_past_the_end_that_its_trip_is_over_before(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    nodes = '<node id="w" x="0" y="0"/><node id="e" x="600" y="0"/>'
+    lane = plain_file(nodes, '<edge id="we" from="w" to="e" speed="13.9"/>')
+    slow = '<vType id="slow" maxSpeed="4.5"/><trip id="ego" type="slow" from="we" to="we" depart="1"/>'
+    (endless,) = draw(traffic(tmp_path, lane, slow), 1).trips
+    end = endless.departs + endless.expected + MARGIN + 1.0
+    assert end < endless.departs + SLOWER * endless.expected
+    assert draw(traffic(tmp_path, lane, slow, end=f"{end:g}"), 1).trips == (endless,)
+
+
+@pytest.mark.parametrize(
+    ("speed", "reason"),
+    [("2", "held up for longer than an ego's patience"), ("0.01", "not over before the end")],
+    ids=["late", "never"],
+)
+def test_a_trip_that_sumos_driver_takes_too_long_for_is_told_from_one_that_it_never_finishes(
+    tmp_path: Path, street: Path, monkeypatch: pytest.MonkeyPatch, speed: str, reason: str
+) -> None:
+    monkeypatch.setattr(trips, "LONGEST_WINDOW", 400.0)
+    slow = f'<vType id="slow" maxSpeed="{speed}"/><trip id="ego" type="slow" from="ab" to="bc" depart="1"/>'
+    with pytest.raises(ScenarioError, match=f"no trip to drive .*1 {reason}"):
+        draw(traffic(tmp_path, street, slow), 1)
 
 
 @pytest.mark.parametrize(
