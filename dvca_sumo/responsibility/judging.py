@@ -1,12 +1,13 @@
 """Whose doing a violation is, by written rules.
 
 1. The simulator's: see `disturbances`.
-2. The other one's: it ran into the standing ego; it ran into the rear of the ego while that was in its lane, or while
-   the ego was on its way out of the other one's lane; it moved, and touched the flank of an ego that was in its lane
-   and not on a junction. Then time to collision and distance to that same object just before are its doing, too. And
-   a destination is not reached for the others' sake when SUMO's own driver on the same trip had not arrived after the
-   same time either, when it ends in a jam (see `jams`), or when the ego, the time in queues apart that no ego heads
-   (see `queues`), was not too slow compared with that driver.
+2. The other one's: it ran into the standing ego, unless it stood, too, and the ego crept; it ran into the rear of the
+   ego while that was in its lane, or while the ego was on its way out of the other one's lane; it moved, and touched
+   the flank of an ego that was in its lane and not on a junction. Then time to collision and distance to that same
+   object just before are its doing, too. And a destination is not reached for the others' sake when SUMO's own driver
+   on the same trip had not arrived after the same time either, when it ends in a jam (see `jams`), or when the ego, the
+   time in queues apart that no ego heads (see `queues`), was not too slow compared with that driver; jams apart, not
+   when the ego stood for no reason.
 3. Everything else is the driver's: the ego's own. Traffic rules are always the driver's.
 
 The ego, or its rear, is in its lane when no corner is more than 0.3 m beyond the edges of the lane under its middle,
@@ -82,7 +83,7 @@ def judged(
             found.append(Judged(oracle, violation, AtFault.SIMULATOR, reason))
         elif excuse and contact is not None and _belongs(violation, contact):
             found.append(Judged(oracle, violation, AtFault.OTHER, excuse))
-        elif oracle == Destination.kind and jam is not None:
+        elif violation.kind == Destination.not_reached and jam is not None:
             found.append(Judged(oracle, violation, AtFault.OTHER, f"held up in a jam behind {jam}"))
         else:
             found.append(Judged(oracle, violation, AtFault.DRIVER, ""))
@@ -95,19 +96,21 @@ def _belongs(violation: Violation, contact: Violation) -> bool:
 
 def _excuse(contact: Violation, moment: Moment, roadmap: RoadMap) -> str:
     """Why a contact is the other one's doing; empty if it is not."""
-    if contact.contact is Contact.STOPPED_EGO:
-        return "ran into the standing ego"
     if contact.contact is Contact.ACTIVE_FRONT:
         return ""
     ego = moment.ego
+    row = moment.objects.ids.index(contact.object or "")
+    speed = math.hypot(*moment.objects.velocities[row].tolist())
+    stands = speed < _STANDING
+    if contact.contact is Contact.STOPPED_EGO:
+        return "" if stands and speed <= abs(ego.speed) else "ran into the standing ego"
     box = box_of(ego.x, ego.y, ego.heading, moment.shape)
     spots = corners(box[None])[0]
-    row = moment.objects.ids.index(contact.object or "")
     if contact.contact is Contact.HIT_FROM_BEHIND:
         other = moment.objects.boxes[row]
         is_clear = _lane_kept(spots[_REAR], box, roadmap) is not None or _leaves(spots[_REAR], box, other, roadmap)
         return "ran into the ego from behind" if is_clear else ""
-    if math.hypot(*moment.objects.velocities[row].tolist()) < _STANDING:
+    if stands:
         return ""
     lane = _lane_kept(spots, box, roadmap)
     return "touched the ego in its lane" if lane is not None and not lane.is_internal else ""

@@ -11,6 +11,7 @@ from moments import LANE_Y, Row, cruise, moment, places
 
 from dvca_sumo.messages import ObjectClass
 from dvca_sumo.oracles.collision import Collision
+from dvca_sumo.oracles.destination import Destination
 from dvca_sumo.oracles.protocol import Oracle
 from dvca_sumo.oracles.speed_limit import SpeedLimit
 from dvca_sumo.oracles.ttc import TimeToCollision
@@ -19,7 +20,7 @@ from dvca_sumo.responsibility.judging import AtFault, judged
 from dvca_sumo.roadmap import RoadMap
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import Moment
-from dvca_sumo.violations import Ending
+from dvca_sumo.violations import Answer, Category, Ending, Judgement, Violation
 
 
 @pytest.fixture(scope="module")
@@ -232,6 +233,26 @@ def test_a_standing_ego_is_never_at_fault(roads: RoadMap) -> None:
     assert at_contact(moments, roads) == [("collision", AtFault.OTHER)]
 
 
+@pytest.mark.parametrize("is_on_foot", [False, True], ids=["in a car", "on foot"])
+@pytest.mark.parametrize(
+    ("own", "others", "fault"), [(0.08, 0.0, AtFault.DRIVER), (0.0, 0.05, AtFault.OTHER), (0.08, 0.12, AtFault.OTHER)]
+)
+def test_of_two_who_stand_the_one_that_creeps_is_at_fault(
+    roads: RoadMap, *, own: float, others: float, is_on_foot: bool, fault: AtFault
+) -> None:
+    """The ego comes to 3 cm of the other one's front."""
+    moments = []
+    for k in range(-50, 8):
+        front = 60.0 + (0.03 * k if k < 0 else 0.1 * own * k)
+        near = 60.028 - 0.1 * others * max(k, 0)
+        row: Row = ("near", (near + (0.25 if is_on_foot else 2.3), LANE_Y), -others if k > 0 else 0.0)
+        one = moment(5.0 + 0.1 * k, front, own if k > 0 else 0.3, [row])
+        moments.append(on_foot(one) if is_on_foot else one)
+        if near <= front:
+            break
+    assert at_contact(moments, roads)[-1] == ("collision", fault)
+
+
 @pytest.mark.parametrize(("front", "fault"), [(60.0, AtFault.OTHER), (202.0, AtFault.DRIVER)])
 def test_a_touched_flank_is_the_others_in_the_egos_lane_and_not_on_a_junction(
     roads: RoadMap, front: float, fault: AtFault
@@ -336,6 +357,18 @@ def _walked(k: int, front: float, *, waits: bool) -> Moment:
     one = on_foot(moment(0.1 * k, front + 0.2 * k, 2.0, [("p", (200.0, y), 0.0)]))
     velocities = np.array([[0.0, 1.2 * (k > 0 or not waits)]])
     return msgspec.structs.replace(one, objects=msgspec.structs.replace(one.objects, velocities=velocities))
+
+
+@pytest.mark.parametrize(
+    ("kind", "fault"), [(Destination.not_reached, AtFault.OTHER), (Destination.overrun, AtFault.DRIVER)]
+)
+def test_a_jam_keeps_the_ego_from_its_destination_and_does_not_drive_it_past(
+    roads: RoadMap, kind: str, fault: AtFault
+) -> None:
+    violation = Violation(kind, Category.MISSION, 9.0, None, (0.0, 0.0), None, 40.0, 3.0, "")
+    judgement = Judgement(Destination.kind, Answer.VIOLATED, (violation,))
+    (found,) = judged([judgement], Disturbances(places(roads)), moment(9.0, 60.0, 0.0), roads, "somebody")
+    assert found.fault is fault
 
 
 def test_traffic_rules_are_always_the_drivers(roads: RoadMap) -> None:
