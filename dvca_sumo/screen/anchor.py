@@ -1,9 +1,9 @@
 """The same trips driven by SUMO's own drivers, in one run without any ADS, before the same oracles.
 
 Three things differ from an ego's drive. The destination is not asked of them: SUMO takes its vehicles away at speed,
-where they arrive. They go on after a contact, which to SUMO may be none; but as an ego's drive, theirs is not judged
-any more. And they have more patience, so that their travel times are known. Whom SUMO sends another way is followed no
-farther.
+where they arrive. They go on after a contact, which to SUMO may be none; but as an ego's drive, theirs is neither
+judged nor measured any more, but for how far and how long it goes. And they have more patience, so that their travel
+times are known. Whom SUMO sends another way is followed no farther.
 """
 
 from collections.abc import Sequence
@@ -24,6 +24,7 @@ from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Ending
 from dvca_sumo.world import Entry, Native, World
 
+UNASKED = (Destination.kind,)  # oracles
 _PATIENCE = 1200.0  # [s] for one trip, at least: some scenarios jam for ever
 
 
@@ -76,7 +77,7 @@ class _Ride:
         route = departing.route(entry)
         judging = departing.judging(entry, route)
         self.native: Native = world.watch(entry, route)
-        self._oracles = [oracle for oracle in judging.oracles if oracle.kind != Destination.kind]
+        self._oracles = [oracle for oracle in judging.oracles if oracle.kind not in UNASKED]
         self._watch = Watch(entry.ego, judging, Queues(world.is_stopping))
         self._latest = entry.time + max(_PATIENCE, patience(free_flow(route)))
         self._is_judged = True

@@ -19,6 +19,8 @@ class Measures:
         """Measures that share `places` with the oracles of the same drive."""
         self.distance = 0.0  # [m]
         self.duration = 0.0  # [s]
+        self.distance_after = 0.0  # [m] thereof after a contact
+        self.duration_after = 0.0  # [s] likewise
         self.hard_brakings = 0  # episodes of deceleration above `HARD`
         self.least_ttc: float | None = None  # [s] that lasted for 0.2 s; None: none below the horizon
         self.last: Moment | None = None
@@ -26,19 +28,30 @@ class Measures:
         self._ttc = TimeToCollision(places, Thresholds(ttc=HORIZON))
         self._recent: dict[str, tuple[float, ...]] = {}  # [s] by object, in the moments up to now without a break
         self._is_braking = False
+        self._has_touched = False
+
+    def touch(self) -> None:
+        """The last moment was a contact's: of what follows, only how far and how long it goes is measured."""
+        self._has_touched = True
 
     def see(self, moment: Moment) -> None:
         """Take in the next moment."""
         if self.last is not None:
             before, now = self.last.ego, moment.ego
             passed = now.time - before.time
+            way = math.dist((before.x, before.y), (now.x, now.y))
             self.duration += passed
-            self.distance += math.dist((before.x, before.y), (now.x, now.y))
-            is_braking = (before.speed - now.speed) / passed > HARD
-            self.hard_brakings += is_braking and not self._is_braking
-            self._is_braking = is_braking
+            self.distance += way
+            if self._has_touched:
+                self.duration_after += passed
+                self.distance_after += way
+            else:
+                is_braking = (before.speed - now.speed) / passed > HARD
+                self.hard_brakings += is_braking and not self._is_braking
+                self._is_braking = is_braking
         self.last = moment
-        self._follow(moment)
+        if not self._has_touched:
+            self._follow(moment)
 
     def _follow(self, moment: Moment) -> None:
         if moment.ego.speed < self._slowest:

@@ -35,6 +35,8 @@ class TripResult(msgspec.Struct, frozen=True):
     distance: float = 0.0  # [m]
     duration: float = 0.0  # [s]
     held: float = 0.0  # [s] thereof in queues
+    distance_after: float = 0.0  # [m] of `distance`: past a contact, where the drive goes on
+    duration_after: float = 0.0  # [s] of `duration`, likewise
     hard_brakings: int = 0
     least_ttc: float | None = None  # [s]; None: none below the horizon
     violations: tuple[Judged, ...] = ()
@@ -74,6 +76,7 @@ class Watch:
     def touch(self, moment: Moment) -> None:
         """Take in the moment of the contact, of a drive that goes on after it."""
         self._contact = moment
+        self._measures.touch()
 
     def result(
         self,
@@ -94,6 +97,8 @@ class Watch:
             distance=measures.distance,
             duration=round(measures.duration, 3),
             held=round(self._held.duration, 3),
+            distance_after=measures.distance_after,
+            duration_after=round(measures.duration_after, 3),
             hard_brakings=measures.hard_brakings,
             least_ttc=measures.least_ttc,
             violations=judged(judgements, self._disturbances, self._contact or last, self._roadmap, jam),

@@ -217,8 +217,13 @@ class _Work:
 
 
 def excused(result: TripResult, native: TripResult) -> TripResult:
-    """The result, being late excused where SUMO's driver was held up as long, or the ego by queues."""
+    """The result, being late excused where SUMO's driver was held up as long, or the ego by queues.
+
+    Not where the ego stood for no reason.
+    """
     if result.outcome is not TripOutcome.TIME_OVER:
+        return result
+    if any(one.oracle == NoProgress.kind for one in result.violations):
         return result
     if native.duration > result.duration:
         reason = f"SUMO's driver had not arrived after {result.duration:.0f} s either"
@@ -238,11 +243,9 @@ def excused(result: TripResult, native: TripResult) -> TripResult:
 def _is_late_by_queues(result: TripResult, native: TripResult) -> bool:
     """Whether, all queues apart, the ego was no slower than it may be compared with SUMO's driver.
 
-    For the rest of its way it is taken to need as long as that one did, on average. Not where it stood for no reason.
+    For the rest of its way it is taken to need as long as that one did, on average.
     """
     if native.outcome is not TripOutcome.ARRIVED or result.held <= native.held:
-        return False
-    if any(one.oracle == NoProgress.kind for one in result.violations):
         return False
     moving = native.duration - native.held
     rest = max(1.0 - result.distance / native.distance, 0.0) * moving

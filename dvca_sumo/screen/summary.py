@@ -5,13 +5,13 @@ Rates are events over exposure with the exact Poisson interval, shares have Wils
 
 import statistics
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import msgspec
 
 from dvca_sumo.intervals import Rate, Share, rate_of, share_of
 from dvca_sumo.oracles import ORACLES
-from dvca_sumo.responsibility.judging import AtFault
+from dvca_sumo.responsibility.judging import AtFault, Judged
 from dvca_sumo.screen.neighbours import Neighbours
 from dvca_sumo.screen.results import TripOutcome, TripResult
 
@@ -19,7 +19,7 @@ NEAR = (1, 2, 3)  # [s] of time to collision
 
 
 class OracleSummary(msgspec.Struct, frozen=True):
-    """What one oracle found on all trips."""
+    """What one oracle found on all trips; rates and shares are of nothing where it was not asked."""
 
     violations: int
     kinds: dict[str, int]
@@ -27,7 +27,7 @@ class OracleSummary(msgspec.Struct, frozen=True):
     per_1000_km: Rate  # the driver's own
     per_100_trips: Rate  # likewise
     trips: Share  # with at least one violation of the driver's own
-    unknown: int  # trips on which it could not tell
+    unknown: int  # trips on which it could not tell, or was not asked
 
 
 class Quartiles(msgspec.Struct, frozen=True):
@@ -55,9 +55,9 @@ class DriverSummary(msgspec.Struct, frozen=True):
     not_driven: int
     ended_by_simulator: int  # by a contact of its doing: counted apart
     cut: int  # by the scenario's end before their patience was over, or by SUMO with another route: likewise
-    completed: Share  # of the others
-    km: float
-    hours: float
+    completed: Share  # of the others: arrived without a contact
+    km: float  # up to a contact
+    hours: float  # likewise
     outcomes: dict[str, int]
     at_fault_collisions: int
     at_fault_violations: int
@@ -73,10 +73,15 @@ class DriverSummary(msgspec.Struct, frozen=True):
     neighbours: NeighboursSummary
 
 
-def summary_of(results: Sequence[TripResult], like: Sequence[TripResult], neighbours: Neighbours) -> DriverSummary:
-    """Sum up one driver's trips among `neighbours`; travel times are relative to those of `like`."""
+def summary_of(
+    results: Sequence[TripResult], like: Sequence[TripResult], neighbours: Neighbours, unasked: Collection[str] = ()
+) -> DriverSummary:
+    """Sum up one driver's trips among `neighbours`; travel times are relative to those of `like`.
+
+    Oracles that are `unasked` have judged none of the trips.
+    """
     trips = [result for result in results if result.outcome is not TripOutcome.NOT_DRIVEN]
-    km = sum(trip.distance for trip in trips) / 1000.0
+    km = sum(trip.distance - trip.distance_after for trip in trips) / 1000.0
     faults = Counter(one.fault for trip in trips for one in trip.violations)
     own = faults[AtFault.DRIVER]
     reference = {trip.ego: trip.duration for trip in like if trip.outcome is TripOutcome.ARRIVED}
@@ -86,28 +91,27 @@ def summary_of(results: Sequence[TripResult], like: Sequence[TripResult], neighb
         if trip.outcome is TripOutcome.ARRIVED and reference.get(trip.ego, 0.0) > 0.0
     ]
     ended = sum(_is_ended_by_simulator(trip) for trip in trips)
-    cut = sum(trip.outcome is TripOutcome.CUT for trip in trips)
+    cut = sum(trip.outcome is TripOutcome.CUT and not _contacts(trip) for trip in trips)
+    arrived = sum(trip.outcome is TripOutcome.ARRIVED and not _contacts(trip) for trip in trips)
     nearest = [trip.least_ttc for trip in trips if trip.least_ttc is not None]
     return DriverSummary(
         trips=len(trips),
         not_driven=len(results) - len(trips),
         ended_by_simulator=ended,
         cut=cut,
-        completed=share_of(sum(trip.outcome is TripOutcome.ARRIVED for trip in trips), len(trips) - ended - cut),
+        completed=share_of(arrived, len(trips) - ended - cut),
         km=km,
-        hours=sum(trip.duration for trip in trips) / 3600.0,
+        hours=sum(trip.duration - trip.duration_after for trip in trips) / 3600.0,
         outcomes=dict(Counter(trip.outcome.value for trip in results)),
-        at_fault_collisions=sum(
-            one.violation.contact is not None and one.fault is AtFault.DRIVER
-            for trip in trips
-            for one in trip.violations
-        ),
+        at_fault_collisions=sum(one.fault is AtFault.DRIVER for trip in trips for one in _contacts(trip)),
         at_fault_violations=own,
         others_fault_violations=faults[AtFault.OTHER],
         simulator_violations=faults[AtFault.SIMULATOR],
         violations_per_1000_km=rate_of(own, km / 1000.0),
         violations_per_100_trips=rate_of(own, len(trips) / 100.0),
-        by_oracle={oracle.kind: _oracle(oracle.kind, trips, km) for oracle in ORACLES},
+        by_oracle={
+            oracle.kind: _oracle(oracle.kind, trips, km, is_asked=oracle.kind not in unasked) for oracle in ORACLES
+        },
         travel_time_ratio=_quartiles(ratios),
         hard_brakings_per_100_km=rate_of(sum(trip.hard_brakings for trip in trips), km / 100.0),
         least_ttc=_quartiles(nearest),
@@ -121,13 +125,19 @@ def summary_of(results: Sequence[TripResult], like: Sequence[TripResult], neighb
     )
 
 
+def _contacts(trip: TripResult) -> list[Judged]:
+    return [one for one in trip.violations if one.violation.contact is not None]
+
+
 def _is_ended_by_simulator(trip: TripResult) -> bool:
-    if trip.outcome is not TripOutcome.CONTACT:
-        return False
-    return any(one.violation.contact is not None and one.fault is AtFault.SIMULATOR for one in trip.violations)
+    return any(one.fault is AtFault.SIMULATOR for one in _contacts(trip))
 
 
-def _oracle(kind: str, trips: Sequence[TripResult], km: float) -> OracleSummary:
+def _oracle(kind: str, trips: Sequence[TripResult], km: float, *, is_asked: bool) -> OracleSummary:
+    if not is_asked:
+        nothing = rate_of(0, 0.0)
+        by_fault = dict.fromkeys((fault.value for fault in AtFault), 0)
+        return OracleSummary(0, {}, by_fault, nothing, nothing, share_of(0, 0), unknown=len(trips))
     found = [[one for one in trip.violations if one.oracle == kind] for trip in trips]
     own = [sum(one.fault is AtFault.DRIVER for one in some) for some in found]
     faults = Counter(one.fault for some in found for one in some)

@@ -10,6 +10,7 @@ import msgspec
 from dvca_sumo.intervals import Rate, Share
 from dvca_sumo.report.result import Json, versions, violation_json
 from dvca_sumo.responsibility.judging import AtFault, Judged
+from dvca_sumo.screen.anchor import UNASKED
 from dvca_sumo.screen.results import TripOutcome, TripResult
 from dvca_sumo.screen.screening import Screening, Setting
 from dvca_sumo.screen.summary import DriverSummary, Quartiles, summary_of
@@ -69,7 +70,8 @@ def terminal_text(screening: Screening) -> str:
     parts = [
         _drawn(screening.draw, screening.setting.egos),
         _table([["", "ADS", "SUMO's driver"], *([name, say(ads), say(sumo)] for name, say in _ROWS)]),
-        "Violations of the driver's own doing per 1 000 km and per 100 trips, 95 % intervals (others', simulator's)\n"
+        "Violations of the driver's own doing per 1 000 km and per 100 trips, 95 % intervals (others', simulator's);"
+        " - where no trip was asked about\n"
         + _table([["oracle", "ADS", "", "", "SUMO's driver", "", ""], *_by_oracle(ads, sumo)]),
     ]
     listed = [_line(trip, one, screening.setting) for trip in screening.ads for one in trip.violations]
@@ -122,7 +124,7 @@ def _summaries(screening: Screening) -> tuple[DriverSummary, DriverSummary]:
     anchor = screening.sumo_driver
     return (
         summary_of(screening.ads, anchor, screening.ads_neighbours),
-        summary_of(anchor, anchor, screening.sumo_neighbours),
+        summary_of(anchor, anchor, screening.sumo_neighbours, UNASKED),
     )
 
 
@@ -158,8 +160,9 @@ def _by_oracle(ads: DriverSummary, sumo: DriverSummary) -> list[list[str]]:
     for kind in ads.by_oracle:
         row = [_named(kind, ads.by_oracle[kind].kinds.keys() | sumo.by_oracle[kind].kinds.keys())]
         for one in (ads.by_oracle[kind], sumo.by_oracle[kind]):
-            others, simulator = one.by_fault["other"], one.by_fault["simulator"]
-            row += [_rate(one.per_1000_km, 0), _rate(one.per_100_trips, 1), f"({others}, {simulator})"]
+            is_asked = one.per_100_trips.value is not None
+            apart = f"({one.by_fault['other']}, {one.by_fault['simulator']})" if is_asked else "-"
+            row += [_rate(one.per_1000_km, 0), _rate(one.per_100_trips, 1), apart]
         rows.append(row)
     return rows
 
@@ -190,10 +193,10 @@ _ROWS: Sequence[tuple[str, Callable[[DriverSummary], str]]] = (
     ("trips driven", lambda one: str(one.trips)),
     ("ended by the simulator", lambda one: str(one.ended_by_simulator)),
     ("cut by the scenario's end or another route", lambda one: str(one.cut)),
-    ("completed, of the others", lambda one: _share(one.completed)),
-    ("km", lambda one: f"{one.km:.1f}"),
+    ("completed without a contact, of the others", lambda one: _share(one.completed)),
+    ("km, up to a contact", lambda one: f"{one.km:.1f}"),
     ("at-fault collisions", lambda one: str(one.at_fault_collisions)),
-    ("at-fault violations", lambda one: str(one.at_fault_violations)),
+    ("at-fault violations (of SUMO's driver, without destination)", lambda one: str(one.at_fault_violations)),
     ("per 1 000 km", lambda one: _rate(one.violations_per_1000_km, 0)),
     ("per 100 trips", lambda one: _rate(one.violations_per_100_trips, 1)),
     ("by others", lambda one: str(one.others_fault_violations)),

@@ -130,6 +130,22 @@ def test_a_trip_on_which_sumo_teleports_its_driver_is_not_completed(tmp_path: Pa
     assert sumo.reason.startswith("SUMO teleported it or took it away at ")
 
 
+def test_sumos_drivers_are_measured_up_to_a_contact_and_have_not_completed_their_trip(
+    tmp_path: Path, lane: Path
+) -> None:
+    box = '<poly id="box" type="obstacle.box" fill="1" shape="200,0 204,0 204,-4 200,-4"/>'
+    config = scenario_file(tmp_path, lane, '<trip id="v" from="we" to="we" depart="1"/>', box)
+    scenario = load_scenario(config, AUTO)
+    (sumo,) = in_child(partial(anchored, scenario, [Trip("v", 1.0, 395.0, 29.0, 40.0)], HEAR)).results
+    assert sumo.outcome is TripOutcome.ARRIVED
+    assert [(one.violation.kind, one.fault) for one in sumo.violations][-1] == ("collision", AtFault.DRIVER)
+    assert sumo.distance - sumo.distance_after == pytest.approx(195.0, abs=3.0)
+    assert sumo.start + sumo.duration - sumo.duration_after == pytest.approx(sumo.violations[-1].violation.time)
+    found = summary_of([sumo], [sumo], Neighbours(0.0, 0, 0, 0))
+    assert (found.completed.count, found.completed.total, found.at_fault_collisions) == (0, 1, 1)
+    assert found.travel_time_ratio.count == 1
+
+
 def test_sumos_drivers_have_an_egos_patience_at_least(
     tmp_path: Path, lane: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

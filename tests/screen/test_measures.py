@@ -37,6 +37,19 @@ def test_each_episode_of_hard_braking_counts_once(roads: RoadMap) -> None:
     assert measured(moments, roads).hard_brakings == 2
 
 
+def test_past_a_contact_only_the_way_and_the_time_go_on_and_are_told_apart(roads: RoadMap) -> None:
+    lead: Row = ("lead", (40.0 + 8.0 + 2.3, LANE_Y), 0.0)
+    before, after = cruise(0.4, 10.0), cruise(1.0, 10.0, [lead])[5:]
+    braking = moment(1.1, 50.5, 5.0, [lead])
+    found = measured(before, roads)
+    found.touch()
+    for one in (*after, braking):
+        found.see(one)
+    assert (found.distance, found.duration) == pytest.approx((10.5, 1.1))
+    assert (found.distance_after, found.duration_after) == pytest.approx((6.5, 0.7))
+    assert (found.hard_brakings, found.least_ttc) == (0, None)
+
+
 def test_the_least_time_to_collision_is_one_that_lasted(roads: RoadMap) -> None:
     lead: Row = ("lead", (40.0 + 20.0 + 2.3, LANE_Y), 0.0)
     found = measured(cruise(1.0, 10.0, [lead]), roads)

@@ -118,6 +118,12 @@ def test_what_is_said_as_data(reckless: Screening) -> None:
     assert said["ads"]["at_fault_violations"] > 0
     assert said["ads"]["by_oracle"]["speed_limit"]["trips"]["count"] > 0
     assert said["sumo_driver"]["completed"]["count"] == 2
+    assert said["ads"]["by_oracle"]["destination"]["per_100_trips"]["value"] is not None
+    unasked = said["sumo_driver"]["by_oracle"]["destination"]
+    assert [unasked[rate][end] for rate in ("per_1000_km", "per_100_trips") for end in ("value", "low", "high")] == (
+        [None] * 6
+    )
+    assert (unasked["trips"]["total"], unasked["unknown"]) == (0, 2)
     assert said["draw"] == {"departures": 2, "refused": {}, "drawn": 2}
 
 
@@ -148,6 +154,20 @@ def test_trips_that_the_simulator_ended_or_the_scenario_cut_off_are_counted_apar
     found = summary_of(trips, [], Neighbours(0.0, 0, 0, 0))
     assert (found.trips, found.ended_by_simulator, found.cut) == (5, 1, 1)
     assert (found.completed.count, found.completed.total) == (1, 3)
+    for outcome in (TripOutcome.ARRIVED, TripOutcome.CUT):  # as SUMO's drivers, who go on
+        going_on = [msgspec.structs.replace(one, outcome=outcome) if one.violations else one for one in trips]
+        natives = summary_of(going_on, [], Neighbours(0.0, 0, 0, 0))
+        assert (natives.ended_by_simulator, natives.cut, natives.completed) == (1, 1, found.completed)
+
+
+def test_what_a_driver_does_past_its_contact_is_in_no_rate_but_its_travel_time_is_whole() -> None:
+    native = TripResult(
+        "ego", TripOutcome.ARRIVED, distance=1000.0, duration=100.0, distance_after=600.0, duration_after=64.0
+    )
+    found = summary_of([native], [msgspec.structs.replace(native, duration=50.0)], Neighbours(0.0, 0, 0, 0))
+    assert (found.km, found.hours) == pytest.approx((0.4, 0.01))
+    assert found.hard_brakings_per_100_km.exposure == pytest.approx(0.004)
+    assert found.travel_time_ratio.median == 2.0
 
 
 def _untold(screening: Screening, unknown: tuple[str, ...]) -> Screening:
@@ -195,6 +215,9 @@ def test_the_text_puts_both_drivers_side_by_side(reckless: Screening) -> None:
     assert "SUMO's driver" in text
     assert "alone: yes" in text
     assert "2 trips drawn of 2 departures (no more than that of 3 asked for)" in text
+    destination = next(line for line in text.splitlines() if line.startswith("destination"))
+    assert destination.split()[-3:] == ["-", "-", "-"]
+    assert destination.count(" - ") + destination.endswith(" -") == 3
 
 
 def test_where_there_are_fewer_trips_than_asked_for_it_is_told_why(reckless: Screening) -> None:
@@ -273,6 +296,9 @@ def test_a_destination_is_excused_only_where_sumos_driver_was_held_up_as_long(re
     for taken, fault in ((99.0, AtFault.DRIVER), (101.0, AtFault.OTHER)):
         native = TripResult("ego", TripOutcome.ARRIVED, duration=taken)
         assert [one.fault for one in excused(late, native).violations] == [fault]
+    stood = Judged("no_progress", msgspec.structs.replace(destination, kind="no_progress"), AtFault.DRIVER, "")
+    idle = msgspec.structs.replace(late, violations=(stood, *late.violations))
+    assert excused(idle, TripResult("ego", TripOutcome.ARRIVED, duration=101.0)) == idle
     assert all(result == excused(result, result) for result in reckless.ads)
 
 
