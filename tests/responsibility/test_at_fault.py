@@ -253,6 +253,21 @@ def test_of_two_who_stand_the_one_that_creeps_is_at_fault(
     assert at_contact(moments, roads)[-1] == ("collision", fault)
 
 
+@pytest.mark.parametrize(("own", "others", "fault"), [(0.08, 0.0, AtFault.DRIVER), (0.0, 0.08, AtFault.SIMULATOR)])
+def test_an_ego_that_creeps_for_long_into_who_stands_on_foot_was_not_walked_into(
+    roads: RoadMap, own: float, others: float, fault: AtFault
+) -> None:
+    moments = []
+    for k in range(-60, 25):
+        near = 60.15 - 0.1 * others * max(k, 0)
+        front = 60.0 + (0.03 * k if k < 0 else 0.1 * own * k)
+        row: Row = ("near", (near + 0.25, LANE_Y), -others if k > 0 else 0.0)
+        moments.append(on_foot(moment(6.0 + 0.1 * k, front, own if k > 0 else 0.3, [row])))
+        if near <= front:
+            break
+    assert at_contact(moments, roads)[-1] == ("collision", fault)
+
+
 @pytest.mark.parametrize(("front", "fault"), [(60.0, AtFault.OTHER), (202.0, AtFault.DRIVER)])
 def test_a_touched_flank_is_the_others_in_the_egos_lane_and_not_on_a_junction(
     roads: RoadMap, front: float, fault: AtFault
