@@ -103,7 +103,7 @@ def _excuse(contact: Violation, moment: Moment, roadmap: RoadMap) -> str:
     speed = math.hypot(*moment.objects.velocities[row].tolist())
     stands = speed < _STANDING
     if contact.contact is Contact.STOPPED_EGO:
-        return "" if stands and speed <= abs(ego.speed) else "ran into the standing ego"
+        return "" if stands and speed < abs(ego.speed) else "ran into the standing ego"
     box = box_of(ego.x, ego.y, ego.heading, moment.shape)
     spots = corners(box[None])[0]
     if contact.contact is Contact.HIT_FROM_BEHIND:

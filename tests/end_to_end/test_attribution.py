@@ -127,7 +127,7 @@ def test_the_component_is_found_although_no_two_runs_are_alike(case: Case, tmp_p
     result = loaded((tmp_path / "result.json").read_text(encoding="utf-8"))
     assert result["component"] == case.component
     assert result["planted"]["component_success"] is True
-    assert {probe["jitter"] for probe in result["probes"]} == {0, 1}
+    assert len({probe["jitter"] for probe in result["probes"]}) == len(result["probes"])
     assert f"\nCOMPONENT  {case.component}\n" in said.out
 
 

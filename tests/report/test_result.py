@@ -260,9 +260,9 @@ def test_unresolved_where_the_repetition_could_not_be_told() -> None:
     assert result["probes"][0]["digest"] is None
 
 
-def test_jitter_mode_tells_which_repeat_a_probe_was() -> None:
+def test_jitter_mode_tells_which_schedule_and_noise_a_probe_had() -> None:
     result = perception_missed(repeats=3)
-    assert {probe["jitter"] for probe in result["probes"]} == {0, 1, 2}
+    assert len({probe["jitter"] for probe in result["probes"]}) == len(result["probes"]) > 3
     assert result["message"] == result["interval"]["last_safe"]
     assert result["message"]["index"] < result["interval"]["first_violating"]["index"]
 
