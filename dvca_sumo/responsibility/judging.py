@@ -101,16 +101,16 @@ def _excuse(contact: Violation, moment: Moment, roadmap: RoadMap) -> str:
     ego = moment.ego
     row = moment.objects.ids.index(contact.object or "")
     speed = math.hypot(*moment.objects.velocities[row].tolist())
-    stands = speed < _STANDING
     if contact.contact is Contact.STOPPED_EGO:
-        return "" if stands and speed < abs(ego.speed) else "ran into the standing ego"
+        creeps = speed < abs(ego.speed) < _STANDING  # up to who stands
+        return "" if creeps else "ran into the standing ego"
     box = box_of(ego.x, ego.y, ego.heading, moment.shape)
     spots = corners(box[None])[0]
     if contact.contact is Contact.HIT_FROM_BEHIND:
         other = moment.objects.boxes[row]
         is_clear = _lane_kept(spots[_REAR], box, roadmap) is not None or _leaves(spots[_REAR], box, other, roadmap)
         return "ran into the ego from behind" if is_clear else ""
-    if stands:
+    if speed < _STANDING:
         return ""
     lane = _lane_kept(spots, box, roadmap)
     return "touched the ego in its lane" if lane is not None and not lane.is_internal else ""
