@@ -133,8 +133,8 @@ class Disturbances:
         is_beside = (along > -moment.shape.rear_overhang) & (along < moment.shape.front)
         speeds = np.hypot(velocities[:, 0], velocities[:, 1])
         towards = -np.sign(left) * (velocities @ axes)[:, 1] > math.cos(AT_FLANK) * speeds
-        walks = (speeds >= _STANDING) | (speeds > abs(ego.speed))  # else it is the ego that creeps
-        for row in rows[(gaps <= 0.0) & walks].tolist() if moment.time - self._drove >= STOOD else ():
+        touches = (gaps <= 0.0) & (speeds >= abs(ego.speed))  # who is slower is crept into
+        for row in rows[touches].tolist() if moment.time - self._drove >= STOOD else ():
             self.found.append(Disturbance(moment.time, objects.ids[row], "walked into the standing ego"))
         for name in (objects.ids[row] for row in rows[(gaps < STEP) & is_beside & towards].tolist()):
             if moment.time <= self._excused.get(name, -math.inf):

@@ -253,15 +253,22 @@ def test_of_two_who_stand_the_one_that_creeps_is_at_fault(
     assert at_contact(moments, roads)[-1] == ("collision", fault)
 
 
-@pytest.mark.parametrize(("own", "others", "fault"), [(0.08, 0.0, AtFault.DRIVER), (0.0, 0.08, AtFault.SIMULATOR)])
+@pytest.mark.parametrize(
+    ("own", "others", "last", "fault"),
+    [
+        (0.08, 0.0, 0.0, AtFault.DRIVER),
+        (0.0, 0.08, 0.08, AtFault.SIMULATOR),
+        (0.0, 0.08, 0.0, AtFault.SIMULATOR),  # who comes to rest as it touches
+    ],
+)
 def test_an_ego_that_creeps_for_long_into_who_stands_on_foot_was_not_walked_into(
-    roads: RoadMap, own: float, others: float, fault: AtFault
+    roads: RoadMap, own: float, others: float, last: float, fault: AtFault
 ) -> None:
     moments = []
     for k in range(-60, 25):
         near = 60.15 - 0.1 * others * max(k, 0)
         front = 60.0 + (0.03 * k if k < 0 else 0.1 * own * k)
-        row: Row = ("near", (near + 0.25, LANE_Y), -others if k > 0 else 0.0)
+        row: Row = ("near", (near + 0.25, LANE_Y), -(last if near <= front else others) if k > 0 else 0.0)
         moments.append(on_foot(moment(6.0 + 0.1 * k, front, own if k > 0 else 0.3, [row])))
         if near <= front:
             break
