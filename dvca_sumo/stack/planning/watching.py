@@ -14,6 +14,7 @@ from dvca_sumo.stack.planning.scene import ALONG
 
 _WATCHED_CLASSES = (int(ObjectClass.VEHICLE), int(ObjectClass.BICYCLE))
 _SAME = 1.0  # [m] from where a track was lost, one found is the same
+_DOUBT = 1.0  # [m] of where somebody is who waits
 
 
 class Stage(enum.StrEnum):
@@ -86,7 +87,7 @@ class WatchList:
             found = track if track in there else _found_again(place, there)
             if found is None:
                 continue
-            waits_within = self._config.watch_before + half_lengths[found] + _SAME  # its middle, however long it is
+            waits_within = self._config.watch_before + half_lengths[found] + _DOUBT  # its middle, however long it is
             if math.dist(there[found], place.approach.line.points[-1]) > max(self._config.watch_until, waits_within):
                 continue
             watched[found] = _Place(*there.pop(found), place.approach)
