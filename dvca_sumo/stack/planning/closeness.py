@@ -27,9 +27,22 @@ def hidden_depths(scene: Scene, window: Window) -> Floats:
         return np.zeros((len(scene.owners), 1))
     squares = np.where(lengths > _LONG, 0.25 * (lengths * lengths + widths * widths), 0.0)
     reach = math.ceil(math.sqrt(float(squares.max())))
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(np.abs(window.curvatures), reach), 2 * reach + 1)
+    sharpest = _highest_within(reach, np.abs(window.curvatures))
     of_owners = squares[scene.owners, None]
-    found: Floats = np.minimum(of_owners * around.max(axis=1)[scene.rows[0]], np.sqrt(of_owners))
+    found: Floats = np.minimum(of_owners * sharpest[scene.rows[0]], np.sqrt(of_owners))
+    return found
+
+
+def _highest_within(reach: int, values: Floats) -> Floats:
+    """The highest of `values` (n,), none of them negative, up to `reach` places from each."""
+    count, places = len(values), 2 * reach + 1
+    highest = np.zeros(count + 2 * reach)  # of as many values as `taken`, from each place on
+    highest[reach : reach + count] = values
+    taken = 1
+    while 2 * taken <= places:
+        highest = np.maximum(highest[:-taken], highest[taken:])
+        taken *= 2
+    found: Floats = np.maximum(highest[:count], highest[places - taken :])
     return found
 
 
