@@ -59,7 +59,8 @@ class LaneChanges:
                 traffic = Traffic.of(tracked.classes[owner], tracked.boxes[owner, 3])
                 rows.append(row)
                 guesses.append(station)
-                paths.append(self._paths.branches(lane, station + float(reaches[owner]), traffic)[0][0])
+                branches = self._paths.branches(lane, station + float(reaches[owner]), traffic)
+                paths.append(max(branches, key=lambda branch: branch[1])[0])
         if not rows:
             return candidates, drift
         owners = candidates.owners[rows]
