@@ -1,5 +1,7 @@
 """Lanes, and how traffic moves from one to the next: what a net says, as frozen values."""
 
+import math
+
 import msgspec
 
 from dvca_sumo.geometry.polyline import Polyline
@@ -37,6 +39,11 @@ class Lane(msgspec.Struct, frozen=True, eq=False, gc=False):
     right: str | None
     successors: tuple[str, ...]
 
+    @property
+    def mapped_limit(self) -> float:
+        """The speed limit [m/s] as far as the map of an ADS goes: infinite where that has none."""
+        return self.speed_limit if self.is_limit_mapped else math.inf
+
     def station(self, position: float) -> float:
         """Where on `line` SUMO's lane position [m] lies [m], within the lane."""
         return min(max(position / self.length, 0.0), 1.0) * self.line.length
@@ -46,7 +53,7 @@ class Movement(msgspec.Struct, frozen=True, eq=False, gc=False):
     """A way across a junction: one connection of the net (for pedestrians: a crossing)."""
 
     junction: str
-    index: int  # the junction's link index, a bit in foes and responses; -1 where it has none
+    index: int  # the junction's link index, a bit in foes and responses
     from_lane: str
     to_lane: str
     internal: tuple[str, ...]  # lanes on the junction in driving order, none in a net without

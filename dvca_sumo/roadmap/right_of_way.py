@@ -82,7 +82,7 @@ def _begins(net: NetContents, movements: Iterable[Movement]) -> list[Lane]:
 
 
 def _approach(lane: Lane) -> Approach:
-    return Approach(lane.id, lane.line, lane.width, lane.speed_limit)
+    return Approach(lane.id, lane.line, lane.width, lane.mapped_limit)
 
 
 def crossings(

@@ -29,7 +29,7 @@ class Approach(msgspec.Struct, frozen=True, eq=False):
     lane: str
     line: Polyline  # centre line, up to the junction
     width: float  # [m]
-    speed_limit: float  # [m/s] by law
+    speed_limit: float  # [m/s] infinite where the map has none
 
 
 class StopLine(msgspec.Struct, frozen=True, eq=False):

@@ -24,7 +24,7 @@ _STEP_X, _STEP_Y, _X, _Y, _HEADING, _HALF_WIDTH, _BEND_SQUARE, _LIMIT_SQUARE, _R
 
 _TAIL = 300  # [m] beyond a dead end or the net's edge, traffic is taken to go straight on
 _LENGTH_STEP = 40.0  # [m] continuations are kept by length in such steps
-_BEND = 2  # columns (metres) to either side over which curvature is taken
+_BEND = 5  # columns (metres) to either side over which curvature is taken: nets draw bends as kinks, and gaps, too
 _WINDOW = np.arange(-8, 9)  # columns (metres) around a guessed station that a projection searches
 
 
@@ -168,7 +168,7 @@ class LanePaths:
                 *poses.T,
                 np.array([part.width / 2.0 for part in parts])[which],
                 self._bend_squares(poses[:, 2]),
-                np.array([part.speed_limit**2 for part in parts])[which],
+                np.array([part.mapped_limit**2 for part in parts])[which],
             ]
         )
         first = self._stored(columns)
@@ -178,7 +178,8 @@ class LanePaths:
         """The square of the speed at each column that leaves time to brake for the bends ahead [m^2/s^2]."""
         if len(headings) <= 2 * _BEND:
             return np.full(len(headings), np.inf)
-        turns = np.abs(headings[2 * _BEND :] - headings[: -2 * _BEND]) / (2.0 * _BEND)
+        # Where lanes are drawn over each other a line goes back a little, and may have turned all the way round then.
+        turns = np.abs(wrapped_all(headings[2 * _BEND :] - headings[: -2 * _BEND])) / (2.0 * _BEND)
         squares = self._lateral_acceleration / np.maximum(np.pad(turns, _BEND, mode="edge"), 1e-6)
         # v(s)^2 <= v(s')^2 + 2 b (s' - s) for every s' ahead: a running minimum from behind.
         braking = 2.0 * self._braking * np.arange(len(headings))

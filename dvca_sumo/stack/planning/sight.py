@@ -68,7 +68,7 @@ class Sights:
         config, shape = self._config, self._shape
         lanes = self._lanes.get(view.line)
         if lanes is None:
-            lanes = self._lanes[view.line] = _Lanes(view.line)
+            lanes = self._lanes[view.line] = _Lanes(view.line, config)
         eyes, boxes = _eyes(path, shape.centre), predicted.objects.boxes
         hides = (np.hypot(*(boxes[:, :2] - eyes).T) < _NEAR) & (boxes[:, 4] > _NARROW)
         lanes.look(eyes, boxes[hides], predicted.time)
@@ -91,10 +91,11 @@ class Sights:
 class _Lanes:
     """Places on the lanes that go first at one line: (lanes, places) of each."""
 
-    def __init__(self, line: StopLine) -> None:
+    def __init__(self, line: StopLine, config: PlanningConfig) -> None:
         lanes = line.prior
         self._points = np.empty((len(lanes), len(_WAYS), 2))
-        self._speeds = np.array([[each.speed_limit] for each in lanes]).reshape(-1, 1)
+        limits = [each.speed_limit if each.speed_limit < math.inf else config.urban_limit for each in lanes]
+        self._speeds = np.array(limits).reshape(-1, 1)
         self._carried = np.zeros(self._speeds.shape)  # [m] of the way to the next place
         self._time = -math.inf
         lengths = np.array([[each.line.length] for each in lanes]).reshape(-1, 1)
