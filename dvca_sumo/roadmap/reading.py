@@ -21,6 +21,7 @@ _ROAD = ("", "internal")  # edge functions with traffic along them
 _MOTORWAYS = ("highway.motorway", "highway.trunk")  # SUMO's types of edges imported from OpenStreetMap
 _PREFIX = "dvca."  # of parameters that are this program's
 _LIMIT_KEY, _MISSING = "dvca.map.speed_limit", "missing"  # parameter of an edge: a gap in the map an ADS drives on
+_UNREGULATED = ("unregulated", "traffic_light_unregulated")  # types of junctions without any right of way
 _STUB = 0.01  # [m] length given to a lane drawn as a single point
 
 
@@ -205,7 +206,7 @@ def _junction(
         _movement(connection, index, vias, groups, vehicle_class) for index, connection in enumerate(_links(node))
     )
     foes, responses = dict(node._foes), dict(node._prohibits)  # noqa: SLF001 no accessor
-    if node.getType() == "unregulated":  # nobody has to wait there, so nobody may count on it
+    if node.getType() in _UNREGULATED:  # nobody has to wait there, so nobody may count on it
         foes = responses = drawn_foes(movements, lanes)
     return Junction(
         id=node.getID(),

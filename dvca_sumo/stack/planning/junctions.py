@@ -26,6 +26,7 @@ _SWUNG = 1.0  # [m] that a line leads aside to turn back, from which on who stan
 _STRAIGHT = 0.1  # [m] of the rear axle beside the middle of its lane, with which the body is in it
 _SWING = 25.0  # [m] before a line, within which one swings out to turn back
 _ON_YELLOW = 2.0  # [s] for which yellow lasts: who has swung out, and comes to the line within, goes on
+_ON_JUNCTION = ":"  # at the beginning of names of lanes, in SUMO
 _MERGE_REACH = 10.0  # [m] past the junction, where traffic from other approaches still joins
 
 
@@ -232,13 +233,14 @@ def _as_one(first: StopLine, second: StopLine) -> StopLine:
 def has_priority(views: list[LineView], near: float, far: float, lanes: tuple[str, ...]) -> bool | None:
     """Whether traffic on `lanes` has priority over the ego where they meet, between two route stations.
 
-    None where the map does not tell: they do not meet on a junction, or not on conflicting lanes.
+    None where the map does not tell: they do not meet on a junction, or not on conflicting lanes. Lanes on the junction
+    tell more than the approach, from which others may go first that cross the ego's way elsewhere.
     """
     for view in views:
         line = view.line
         if line.station - 1.0 <= far and near <= line.exit_station + _MERGE_REACH:
-            if not view.goes_first.isdisjoint(lanes):
-                return True
-            if not (line.yields_to.isdisjoint(lanes) and line.crosses.isdisjoint(lanes)):
-                return False
+            met = [lane for lane in lanes if lane in view.goes_first or lane in line.yields_to or lane in line.crosses]
+            met = [lane for lane in met if lane.startswith(_ON_JUNCTION)] or met
+            if met:
+                return not view.goes_first.isdisjoint(met)
     return None
