@@ -8,6 +8,7 @@ import msgspec
 
 from dvca_sumo.messages import Floats, Integers, SignalColour, VehicleShape
 
+SURROUNDINGS = 150.0  # [m] around an ego, within which others are told of
 DRAWN = "polygon:"  # before the names of what is drawn as an area or a line
 
 

@@ -15,7 +15,7 @@ from dvca_sumo.geometry.randomness import key_of, normals, uniforms
 from dvca_sumo.messages import Floats, Integers, ObjectClass, VehicleShape
 from dvca_sumo.stack.protocols import Detections, GnssFix, OdometryReading
 from dvca_sumo.stack.visibility import nearest_distances, visible_shares
-from dvca_sumo.truth import EgoTruth, Moment
+from dvca_sumo.truth import SURROUNDINGS, EgoTruth, Moment
 
 _RUN = key_of("sensors of this run")
 _ODOMETRY = key_of("odometry")
@@ -29,8 +29,8 @@ _SHARE = (0.0, 1.0)
 _ANGLE = (0.0, 6.2832)  # [rad] a full turn, written to four places
 _RANGES = {
     "gnss_bias_fixes": (1.0, math.inf),
-    "range": (0.1, math.inf),  # [m] distances are told as shares of it
-    "far_range": (0.1, math.inf),  # [m] likewise
+    "range": (0.1, SURROUNDINGS),  # [m] distances are told as shares of it
+    "far_range": (0.1, SURROUNDINGS),  # [m] likewise
     "field_of_view": _ANGLE,
     "far_field_of_view": _ANGLE,
     "visible_share": _SHARE,

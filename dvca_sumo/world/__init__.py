@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dvca_sumo.roadmap import Route
 from dvca_sumo.scenario import AUTO, Scenario, ScenarioError
-from dvca_sumo.truth import Moment
+from dvca_sumo.truth import SURROUNDINGS, Moment
 from dvca_sumo.world.bodies import Ego, Native, shape_of
 from dvca_sumo.world.entry import Entry
 from dvca_sumo.world.levels import on_level
@@ -16,7 +16,6 @@ from dvca_sumo.world.vehicle import ControlCommandError, Vehicle, VehicleLimits
 
 __all__ = ["ControlCommandError", "Ego", "Entry", "Native", "Vehicle", "VehicleLimits", "World", "shape_of"]
 
-RADIUS = 150.0  # [m] around an ego within which other bodies are observed; beyond every sensor's range
 AUTO_DELAY = 60.0  # [s] after the begin, so that a chosen ego meets traffic
 LONGEST_DELAY = 600.0  # [s] beyond its departure time an ego's road will not clear any more
 
@@ -109,7 +108,7 @@ class World:
     def adopt(self, entry: Entry, route: Route, limits: VehicleLimits) -> Ego:
         """Take a vehicle that has just departed out of SUMO's hands, and its own stops off it."""
         self._session.skip_stops(entry.ego)
-        self._session.adopt(entry, RADIUS)
+        self._session.adopt(entry, SURROUNDINGS)
         ego = Ego(entry, route, limits)
         self._egos.append(ego)
         return ego
@@ -117,7 +116,7 @@ class World:
     def watch(self, entry: Entry, route: Route) -> Native:
         """Look at a vehicle that has just departed and stays in SUMO's hands; like an ego it makes no stops."""
         self._session.skip_stops(entry.ego)
-        self._session.watch(entry.ego, RADIUS)
+        self._session.watch(entry.ego, SURROUNDINGS)
         return Native(entry, route)
 
     def follow(self, native: Native) -> bool:
@@ -137,7 +136,7 @@ class World:
         return Moment(
             ego=truth,
             shape=ego.shape,
-            objects=joined(moving, self._obstacles, (truth.x, truth.y), RADIUS),
+            objects=joined(moving, self._obstacles, (truth.x, truth.y), SURROUNDINGS),
             signals=self._session.signals(ego.signals),
         )
 

@@ -31,8 +31,8 @@ NOISELESS = SensorConfig(
 
 # What makes no sense, and what is said to be allowed.
 SENSELESS: list[tuple[str, float, str]] = [
-    ("far_range", -5.0, "0.1 or more"),
-    ("range", 0.0, "0.1 or more"),
+    ("far_range", -5.0, "0.1 to 150"),
+    ("range", 0.0, "0.1 to 150"),
     ("field_of_view", -0.1, "0 to 6.2832"),
     ("far_field_of_view", 360.0, "0 to 6.2832"),
     ("visible_share", 1.5, "0 to 1"),
