@@ -163,13 +163,16 @@ def _turns(route: Route) -> tuple[tuple[float, float, int], ...]:
 
 
 def _origins(route: Route) -> dict[str, str]:
-    """The lane of a road by which the route comes to each of its lanes of junctions."""
-    origins, road = dict[str, str](), ""
-    for lane in route.lane_ids:
-        if not is_inner(lane):
-            road = lane
-        elif road:
-            origins[lane] = road
+    """The lane of a road that leads to each lane of a junction, on the route or beside it, where the ego may be."""
+    changed = [lanes for change in route.lane_changes for lanes in change.lanes]
+    origins = dict[str, str]()
+    for followed in (route.lane_ids, *changed, *(passing.lane_ids for passing in route.passing_lanes)):
+        road = ""
+        for lane in followed:
+            if not is_inner(lane):
+                road = lane
+            elif road:
+                origins[lane] = road
     return origins
 
 

@@ -71,7 +71,7 @@ class Session:
         self._net = SumoNet()
         ways = Ways(self._net)
         self.egos = Egos(self._net, ways)
-        self._sight = Sight(self._net, ways)
+        self._sight = Sight(self._net, ways, self.egos)
         self._signals: dict[tuple[str, ...], Signals] = {}  # by the heads asked for
 
     @property

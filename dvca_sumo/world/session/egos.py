@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import libsumo
 import msgspec
@@ -36,6 +37,15 @@ _AT_SIGNAL = 10.0  # [m] before it a vehicle waits for it
 _GOING = "gGoO"  # colours of signals that let go
 
 
+class FrontMotion(NamedTuple):
+    """Of one body."""
+
+    x: float  # [m] of its front
+    y: float  # [m]
+    angle: float  # [deg] clockwise from north
+    speed: float  # [m/s]
+
+
 class _Adopted(msgspec.Struct):
     """What SUMO is told of an ego, and why."""
 
@@ -47,6 +57,7 @@ class _Adopted(msgspec.Struct):
     fastest: float  # [m/s] that it can drive
     length: float  # [m] of lane that it takes up
     matching: int  # how SUMO finds its lane
+    motion: FrontMotion | None = None  # its own, which SUMO may be told otherwise; None until it is moved
     goes: bool = True  # means to, when it can
     shadows: tuple[str, ...] = ()  # lanes on which one stands for it
 
@@ -84,6 +95,11 @@ class Egos:
             itinerary, Setback(), Inset(), Lingering(), entry.width, fastest, entry.length, matching
         )
 
+    def motion(self, vehicle: str) -> FrontMotion | None:
+        """How an ego moves, wherever SUMO was told that it is; None of all others."""
+        adopted = self._adopted.get(vehicle)
+        return adopted.motion if adopted is not None else None
+
     def release(self, ego: str) -> None:
         """Forget an ego that leaves the simulation, and take away what stands for it."""
         for lane in self._adopted.pop(ego).shadows:
@@ -101,15 +117,15 @@ class Egos:
         """
         found = libsumo.vehicle.getLaneID(ego)
         adopted = self._adopted[ego]
+        cosine, sine, angle = math.cos(truth.heading), math.sin(truth.heading), 90.0 - math.degrees(truth.heading)
+        adopted.motion = FrontMotion(truth.x + front * cosine, truth.y + front * sine, angle, truth.speed)
         ahead = front - adopted.setback.at(truth.x, truth.y, truth.speed, is_on_lane=bool(found))
-        x = truth.x + ahead * math.cos(truth.heading)
-        y = truth.y + ahead * math.sin(truth.heading)
+        x, y = truth.x + ahead * cosine, truth.y + ahead * sine
         if found and truth.speed <= SLOW and not self._has_sublanes:
             lane, x, y = self._held(ego, lane, x, y, found)
         middle, width = self._net.middle(lane)
         x, y = adopted.inset.at(x, y, middle, 0.5 * (width + adopted.width), is_on_lane=bool(found))
         edge, _, index = lane.rpartition("_")
-        angle = 90.0 - math.degrees(truth.heading)
         adopted.itinerary.reach(edge)
         if found and libsumo.vehicle.getRouteID(ego) != adopted.itinerary.route:
             self._remind(ego, found)
@@ -136,7 +152,7 @@ class Egos:
         if not self._has_sublanes:
             found = libsumo.vehicle.getLaneID(ego)
             taken = self._straddling.parts(truth, shape, ends, found, goes=adopted.goes)
-            parts = {lane: part for lane, part in taken.items() if not _is_occupied(lane, *part, ego)}
+            parts = {lane: part for lane, part in taken.items() if not self._is_occupied(lane, *part, ego)}
         for lane in adopted.shadows:
             if lane not in parts:
                 _take_away(shadow_of(ego, lane))
@@ -166,7 +182,7 @@ class Egos:
                 line, reach = self._net.middle(next_to)
                 front = line.project(point)
                 is_there = line.distance(point) < 0.5 * (reach + adopted.width)
-                if is_there and _is_occupied(next_to, front - adopted.length, front, ego):
+                if is_there and self._is_occupied(next_to, front - adopted.length, front, ego):
                     return found, *within(x, y, middle, most)
         return lane, x, y
 
@@ -189,6 +205,17 @@ class Egos:
             of.setRoute(ego, onward)
             itinerary.route = of.getRouteID(ego)
 
+    def _is_occupied(self, lane: str, begin: float, end: float, ego: str) -> bool:
+        """Whether somebody is on that part of a lane already: who is stopped beside an ego must not stay for ever.
+
+        `begin` and `end` are along the lane as it is drawn [m].
+        """
+        of, shadow = libsumo.vehicle, shadow_of(ego, lane)
+        others = (name for name in libsumo.lane.getLastStepVehicleIDs(lane) if name not in (ego, shadow))
+        fronts = ((of.getLanePosition(name), of.getLength(name)) for name in others)
+        drawn = self._net.middle(lane)[0].length / libsumo.lane.getLength(lane)
+        return any(begin < drawn * front and drawn * (front - length) < end for front, length in fronts)
+
     def _cast(self, shadow: str, lane: str, begin: float, end: float) -> None:
         """Have a shadow on a lane from `begin` to `end` [m]."""
         of, (edge, _, index) = libsumo.vehicle, lane.rpartition("_")
@@ -208,14 +235,6 @@ class Egos:
 def _take_away(shadow: str) -> None:
     if has(shadow):
         libsumo.vehicle.remove(shadow)
-
-
-def _is_occupied(lane: str, begin: float, end: float, ego: str) -> bool:
-    """Whether somebody is on that part of a lane already: who is stopped beside an ego must not stay for ever."""
-    of, shadow = libsumo.vehicle, shadow_of(ego, lane)
-    others = (name for name in libsumo.lane.getLastStepVehicleIDs(lane) if name not in (ego, shadow))
-    fronts = ((of.getLanePosition(name), of.getLength(name)) for name in others)
-    return any(begin < front and front - length < end for front, length in fronts)
 
 
 def _has_red(vehicle: str) -> bool:

@@ -14,6 +14,7 @@ from dvca_sumo.truth import ObjectsTruth
 from dvca_sumo.world.crowd import Body, Crowd
 from dvca_sumo.world.footing import Footing
 from dvca_sumo.world.net import Net, edge_of, is_for_cars
+from dvca_sumo.world.session.egos import Egos, FrontMotion
 from dvca_sumo.world.session.vehicles import has, is_shadow
 from dvca_sumo.world.ways import Ways
 
@@ -27,7 +28,7 @@ class _Seen(NamedTuple):
     """One moving body at this step, whoever watches it."""
 
     name: str  # a key of the bodies
-    motion: tuple[float, float, float, float]  # SUMO's x, y [m], angle [deg], speed [m/s]
+    motion: FrontMotion
     lane: str  # "" on foot
     ground: str  # the edge that somebody on foot is on
 
@@ -47,9 +48,10 @@ class _Readings(dict[str, tuple[_Seen, ...]]):
 class Sight:
     """Reads what moves around vehicles, each body once a step however many see it."""
 
-    def __init__(self, net: Net, ways: Ways) -> None:
+    def __init__(self, net: Net, ways: Ways, egos: Egos) -> None:
         self._net = net
         self._ways = ways
+        self._egos = egos
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
         self._vehicles, self._people = _Readings(self._vehicle_now), _Readings(self._person_now)
@@ -113,14 +115,16 @@ class Sight:
         if abs(x) >= NOWHERE or is_shadow(name):
             return ()
         lane = sys.intern(of.getLaneID(name))  # met again in thousands of moments
-        return (_Seen(self._vehicle(name), (x, y, of.getAngle(name), of.getSpeed(name)), lane, ""),)
+        motion = self._egos.motion(name) or FrontMotion(x, y, of.getAngle(name), of.getSpeed(name))
+        return (_Seen(self._vehicle(name), motion, lane, ""),)
 
     def _person_now(self, name: str) -> tuple[_Seen, ...]:
         of = libsumo.person
         if of.getVehicle(name):
             return ()
         x, y = of.getPosition(name)
-        return (_Seen(self._person(name), (x, y, of.getAngle(name), of.getSpeed(name)), "", of.getRoadID(name)),)
+        motion = FrontMotion(x, y, of.getAngle(name), of.getSpeed(name))
+        return (_Seen(self._person(name), motion, "", of.getRoadID(name)),)
 
     def _vehicle(self, name: str) -> str:
         """The key of a vehicle among the bodies."""
