@@ -14,7 +14,7 @@ class RedLight:
     """Kind "red_light": the front bumper passes the line on red and is beyond the tolerance while it is still red.
 
     Yellow is allowed, and so is a line passed in the step in which the signal turned red. Where the
-    bumper stops within the tolerance, `StopLine` judges. Cannot tell of a line that was passed while
+    bumper stops within the tolerance, `StopAtLine` judges. Cannot tell of a line that was passed while
     the colour of its signal was not recorded, or while the ego was off its route.
     """
 

@@ -1,11 +1,11 @@
-"""Speed limit of the lane under the ego's front bumper."""
+"""Speed limit of the ego's lane."""
 
 import numpy as np
 
 from dvca_sumo.messages import Floats
 from dvca_sumo.oracles.findings import Findings
 from dvca_sumo.oracles.place import Place, Places
-from dvca_sumo.roadmap import Route
+from dvca_sumo.roadmap import Lane, Route
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Category, Ending, Judgement, Violation
@@ -14,9 +14,10 @@ from dvca_sumo.violations import Category, Ending, Judgement, Violation
 class SpeedLimit:
     """Kind "speed_limit": true speed above limit + tolerance for the dwell time; one for each such episode.
 
-    A slower lane counts from the line on where the front bumper enters it. Inside a junction the limit
-    of the lane before holds, where that is higher: SUMO's speeds of turns are driving advice, not law.
-    Cannot tell of the time that the ego was off its route, nor of lanes where variable signs set the limit.
+    A slower lane counts from the line on where the front bumper enters it, or from when its middle is off the route's
+    lane onto another one of that road. Inside a junction the limit of the lane before holds, where that is higher:
+    SUMO's speeds of turns are driving advice, not law. Cannot tell of the time that the ego was off its route, nor of
+    lanes where variable signs set the limit.
     """
 
     kind = "speed_limit"
@@ -35,12 +36,13 @@ class SpeedLimit:
     def observe(self, moment: Moment) -> Violation | None:
         """See `Oracle`."""
         place = self._places.at(moment)
-        why = self._unknown(place)
+        aside = self._aside(place, moment)
+        why = self._unknown(place, aside)
         if why:
             self._blind = self._blind or f"{why} at {moment.time:.1f} s"
             self._since = None
             return None
-        limit = float(self._limits[place.row])
+        limit = float(self._limits[place.row]) if aside is None else aside.speed_limit
         if moment.ego.speed <= limit + self._tolerance:
             self._since, self._is_reported = None, False
             return None
@@ -55,11 +57,23 @@ class SpeedLimit:
         """See `Oracle`."""
         return self._findings.judgement(self._blind)
 
-    def _unknown(self, place: Place) -> str:
+    def _aside(self, place: Place, moment: Moment) -> Lane | None:
+        """The lane beside the route's that the ego is on, of the same road; None where it is not on one."""
+        route, row, lanes = self._places.route, place.row, self._places.roadmap.lanes
+        if not place.is_on_route or route.lane_right[row] <= place.offset <= route.lane_left[row]:
+            return None
+        own, found = (lanes.get(name or "") for name in (route.lane_ids[row], self._places.lane(moment)))
+        if own is None or found is None or own.is_internal or own.edge != found.edge:
+            return None
+        return found
+
+    def _unknown(self, place: Place, aside: Lane | None) -> str:
         """Why the limit at a place is not known; empty if it is."""
         if not place.is_on_route:
             return "the ego was off its route"
         lane = self._signed[place.row]
+        if aside is not None:
+            lane = aside.id if aside.id in self._places.signed_lanes else ""
         return f"the ego was on lane {lane}, whose limit a variable sign sets," if lane else ""
 
 

@@ -1,10 +1,16 @@
 import math
+from types import SimpleNamespace
+from typing import ClassVar, cast
 
+import numpy as np
 import pytest
-from oracle_scenes import drive, judged, moment, straight_road
+from oracle_scenes import BareMap, drive, judged, moment, straight_road
 
+from dvca_sumo.oracles.place import Places
 from dvca_sumo.oracles.speed_limit import SpeedLimit
-from dvca_sumo.violations import Answer
+from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.thresholds import Thresholds
+from dvca_sumo.violations import Answer, Ending
 
 
 def test_driving_above_limit_and_tolerance_is_a_violation_after_the_dwell_time() -> None:
@@ -42,6 +48,29 @@ def test_the_driving_advice_inside_a_junction_is_no_limit() -> None:
     inside = straight_road(limits=limits, lane=lambda station: ":c_0_0" if 100.0 <= station < 120.0 else "in_0")
     assert judged(SpeedLimit, drive(60.0, 140.0, 10.0), inside).answer is Answer.KEPT
     assert judged(SpeedLimit, drive(60.0, 140.0, 10.0), straight_road(limits=limits)).answer is Answer.VIOLATED
+
+
+class TwoLanes(BareMap):
+    """The route's lane, and on its left a faster one of the same road."""
+
+    lanes: ClassVar = {
+        name: SimpleNamespace(id=name, edge="in", is_internal=False, speed_limit=limit)
+        for name, limit in (("in_0", 13.9), ("in_1", 27.8))
+    }
+
+    def lanes_near(self, points: np.ndarray, radius: float) -> list[tuple[str, ...]]:  # noqa: ARG002
+        return [("in_1",) if y > 1.6 else ("in_0",) for _, y in points.tolist()]
+
+
+@pytest.mark.parametrize(
+    ("offset", "signed", "answer"),
+    [(0.0, "", Answer.VIOLATED), (3.2, "", Answer.KEPT), (3.2, "in_1", Answer.UNKNOWN), (0.0, "in_1", Answer.VIOLATED)],
+)
+def test_on_another_lane_of_the_road_the_limit_is_that_lanes(offset: float, signed: str, answer: Answer) -> None:
+    oracle = SpeedLimit(Places(straight_road(), cast("RoadMap", TwoLanes()), frozenset({signed})), Thresholds())
+    for each in drive(20.0, 80.0, 20.0, offset=offset):
+        oracle.observe(each)
+    assert oracle.conclude(Ending.TIME_OVER).answer is answer
 
 
 @pytest.mark.parametrize("speed", [10.0, 20.0])
