@@ -50,7 +50,7 @@ class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         words = ["dvca-sumo", "run", self.scenario, *([] if seed is None else ["--seed", str(seed)])]
         for option, value in (("--fault", self.fault), ("--bug", self.bug), ("--ego", self.ego)):
             words += [option, value] if value else []
-        words += ["--begin", f"{self.begin:g}"] if self.begin is not None else []
+        words += ["--begin", f"{self.begin:.12g}"] if self.begin is not None else []
         words += ["--jitter"] if repeats is not None else []
         words += ["--repeats", str(repeats)] if repeats not in (None, REPEATS) else []
         return shlex.join(words)

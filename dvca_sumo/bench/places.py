@@ -32,7 +32,7 @@ class Place(msgspec.Struct, frozen=True):
 
     def __str__(self) -> str:
         words = [self.scenario, *(["--ego", self.ego] if self.ego else [])]
-        return " ".join(words if self.begin is None else [*words, "--begin", f"{self.begin:g}"])
+        return " ".join(words if self.begin is None else [*words, "--begin", f"{self.begin:.12g}"])
 
 
 class HealthyDrive(msgspec.Struct, frozen=True):

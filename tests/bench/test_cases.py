@@ -1,8 +1,10 @@
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from dvca_sumo.bench.cases import INJECTED, Case, CasesError, cases_in, injected_cases
+from dvca_sumo.bench.places import Place
 from dvca_sumo.installation import scenario_path
 from dvca_sumo.interventions import planted_fault
 
@@ -103,3 +105,9 @@ def test_a_case_that_is_not_whole_is_refused_in_one_line(tmp_path: Path, text: s
 def test_a_file_that_is_missing_is_named(tmp_path: Path) -> None:
     with pytest.raises(CasesError, match=r"other\.toml"):
         cases_in(tmp_path / "other.toml", "injected")
+
+
+def test_the_command_of_a_case_has_its_begin_to_the_last_digit() -> None:
+    case = msgspec.structs.replace(injected_cases()[0], begin=28800.25)
+    assert case.command(None, None).endswith("--begin 28800.25")
+    assert str(Place("city.sumocfg", begin=1234567.5)) == "city.sumocfg --begin 1234567.5"
