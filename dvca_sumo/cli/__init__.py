@@ -55,14 +55,20 @@ def main() -> NoReturn:
         tell(f"error: {error}")
         _leave(ExitCode.INTERNAL)
     except (KeyboardInterrupt, click.Abort):
-        tell("interrupted")
-        _leave(ExitCode.INTERRUPTED)
+        _leave_interrupted()
     except Exception as error:
+        if isinstance(error.__context__, KeyboardInterrupt):  # of which click could not tell anybody
+            _leave_interrupted()
         tell(f"internal error: {type(error).__name__}: {error} (set DVCA_SUMO_TRACEBACK=1 to see where)")
         if os.environ.get("DVCA_SUMO_TRACEBACK"):
             raise
         _leave(ExitCode.INTERNAL)
     sys.exit(ExitCode.NO_VIOLATION)
+
+
+def _leave_interrupted() -> NoReturn:
+    tell("interrupted")
+    _leave(ExitCode.INTERRUPTED)
 
 
 def _leave(code: ExitCode) -> NoReturn:

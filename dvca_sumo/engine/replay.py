@@ -9,7 +9,7 @@ from dvca_sumo.engine.passes import Pass, settled, summary
 from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.engine.protocol import Glimpse, RunFailedError
 from dvca_sumo.record import Record
-from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.roadmap import RoadMap, RoadMapError
 from dvca_sumo.run import Task, rtest
 from dvca_sumo.scenario import ScenarioError
 from dvca_sumo.stack.reference import StackError
@@ -92,7 +92,7 @@ def raised(failure: Failure) -> Exception:
     words = _sumo_words(failure.said)
     if isinstance(failure.error, ScenarioError):
         return ScenarioError(f"{failure.error}{words}")
-    if isinstance(failure.error, StackError):
+    if isinstance(failure.error, (StackError, RoadMapError)):
         return failure.error
     return RunFailedError(f"the run failed: {failure.reason}{words}")
 

@@ -71,7 +71,7 @@ def files_of(source: StackSource) -> dict[str, Path]:
     if source.is_reference:
         return {"parameters": Path(source.stack)}
     name = source.stack.partition(":")[0]
-    place = sys.modules[name].__file__
+    place = getattr(sys.modules[name], "__file__", None)  # none of what is built into Python
     if place is None:
         return {}
     root = Path(place).resolve().parents[name.count(".") + (Path(place).stem == "__init__")]

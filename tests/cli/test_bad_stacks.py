@@ -29,7 +29,7 @@ BAD_FILES = {
     "unknown field": ("[planning]\nbravery = 2\n", ("bravery", "$.planning")),
     "unknown component": ("[brain]\nsize = 2\n", ("brain",)),
     "wrong type": ('[planning]\nacceleration = "fast"\n', ("`str`", "$.planning.acceleration")),
-    "range that is none": ("[sensors]\nfar_range = -5\n", ("far_range is -5", "allowed: 0.1 or more", "$.sensors")),
+    "range that is none": ("[sensors]\nfar_range = -5\n", ("far_range is -5", "allowed: 0.1 to 150", "$.sensors")),
     "value that the stack cannot be built with": (
         "[localization]\nlargest_steering = inf\n",
         ("stack file 'mine.toml' raised ",),
@@ -45,6 +45,13 @@ def test_a_factory_that_does_not_work(stack: str, tmp_path: Path) -> None:
     (tmp_path / "a_script.py").write_text("import sys\nsys.exit(0)\n", encoding="utf-8")
     said = typed("run", "nets/cs1.sumocfg", "--seed", "5", "--stack", stack, folder=tmp_path)
     assert_one_error(said, ExitCode.BAD_INPUT, *BAD_FACTORIES[stack])
+
+
+def test_screening_names_a_factory_that_is_built_into_python_and_returns_no_stack(tmp_path: Path) -> None:
+    """There is no file of it to tell results of the same code by."""
+    said = typed("screen", "nets/cs1.sumocfg", "--stack", "time:sleep", "-o", tmp_path / "kept")
+    assert said.code == ExitCode.UNRESOLVED
+    assert "not_driven: stack factory 'time:sleep' raised TypeError" in said.out
 
 
 @pytest.mark.parametrize("case", BAD_FILES)

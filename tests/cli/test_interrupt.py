@@ -124,3 +124,17 @@ def test_an_interrupt_while_the_program_loads_is_one_as_any_other(
         main()
     assert caught.value.code == ExitCode.INTERRUPTED
     assert capsys.readouterr().err == "interrupted\n"
+
+
+def test_an_interrupt_that_nobody_is_there_to_be_told_of_is_one_all_the_same() -> None:
+    """A reader that has gone: `dvca-sumo run ... 2>&1 | head -1`."""
+    program = (
+        "import os, dvca_sumo.cli as cli, dvca_sumo.cli.running as running\n"
+        "def interrupted(*_): raise KeyboardInterrupt\n"
+        "running.load_scenario = interrupted\n"
+        "reader, writer = os.pipe(); os.dup2(writer, 2); os.close(writer); os.close(reader)\n"
+        "cli.main()\n"
+    )
+    words = [sys.executable, "-c", program, "run", "nets/cs1.sumocfg"]
+    done = subprocess.run(words, check=False, capture_output=True, env=environment())  # noqa: S603
+    assert (done.returncode, done.stdout) == (ExitCode.INTERRUPTED, b"")
