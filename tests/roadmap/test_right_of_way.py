@@ -89,16 +89,19 @@ def test_of_those_with_priority_people_and_who_merges_have_no_such_lane(plain: N
 
 
 @pytest.mark.parametrize(
+    ("kind", "control"), [("unregulated", Control.YIELD), ("traffic_light_unregulated", Control.SIGNAL)]
+)
+@pytest.mark.parametrize(
     ("before", "after", "others"),
     [("wx", "xe", {"sx_0", "ex_0"}), ("wx", "xs", {"ex_0"}), ("ex", "xw", {"sx_0"}), ("sx", "xe", {"wx_0"})],
 )
 def test_where_a_junction_is_unregulated_the_ego_gives_way_to_all_whose_way_meets_its_own(
-    plain: NetBuilder, before: str, after: str, others: set[str]
+    plain: NetBuilder, kind: str, control: Control, before: str, after: str, others: set[str]
 ) -> None:
     ways = ("wx xe", "wx xs", "ex xw", "ex xs", "sx xe", "sx xw")
     connections = "".join('<connection from="{}" to="{}"/>'.format(*way.split()) for way in ways)
-    line = first_line(plain(NODES.format("unregulated"), EDGES, connections), before, after)
-    assert line.control is Control.YIELD
+    line = first_line(plain(NODES.format(kind), EDGES, connections), before, after)
+    assert line.control is control
     assert approaches(line.yields_to) == others
     assert line.crosses == line.yields_to
 

@@ -4,8 +4,10 @@ import math
 import subprocess
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from types import SimpleNamespace
+from typing import NamedTuple, cast
 
+import msgspec
 import numpy as np
 import pytest
 import sumolib
@@ -13,6 +15,8 @@ import sumolib
 from dvca_sumo.geometry.polyline import Polyline
 from dvca_sumo.messages import PREDICTION_TIMES, Floats, ObjectClass, PredictedObjects, TrackedObjects
 from dvca_sumo.roadmap import RoadMap
+from dvca_sumo.stack.continuations import Traffic
+from dvca_sumo.stack.lane_paths import LanePaths, stretches_of
 from dvca_sumo.stack.prediction import MapPrediction, PredictionConfig
 
 RADIUS = 40.0  # [m] of the bend: east along the right lane's line until x = 200, then north along x = 240
@@ -312,6 +316,27 @@ def test_a_turning_vehicle_slows_down_for_the_turn_and_one_going_straight_does_n
     assert steps[straight] == pytest.approx(12.0, abs=0.3)
 
 
+@pytest.mark.parametrize("turn", [0.02, -0.02, 0.2])
+def test_kinks_and_lanes_that_overlap_a_little_are_no_corners(roadmap: RoadMap, turn: float) -> None:
+    """Nets are drawn so, where nobody slows down: from one lane into the next, and where one of them is a point."""
+    onward = 100.0 * np.array([math.cos(turn), math.sin(turn)])
+    drawn = {
+        "before": ([(-100.0, 0.0), (0.0, 0.0)], ("point",)),
+        "point": ([(0.0, 0.0), (0.01, 0.0)], ("after",)),
+        "after": ([(0.0, 0.0), onward.tolist()], ()),
+    }
+    lanes = {
+        name: msgspec.structs.replace(roadmap.lanes["in_0"], id=name, line=Polyline(points), successors=successors)
+        for name, (points, successors) in drawn.items()
+    }
+    paths = LanePaths(
+        cast("RoadMap", SimpleNamespace(lanes=lanes)), max_branches=3, lateral_acceleration=5.5, braking=2.5
+    )
+    ((path, _),) = paths.branches("before", 180.0, Traffic.CARS)
+    bends, _ = paths.caps(stretches_of([path]), np.zeros(1), 180)
+    assert math.sqrt(bends.min()) > 13.9
+
+
 @pytest.mark.parametrize(("y", "drift", "other"), [(-4.4, 1.0, "in_1"), (-2.0, -1.0, "in_0")])
 def test_a_vehicle_drifting_to_the_next_lane_may_change_to_it(
     roadmap: RoadMap, y: float, drift: float, other: str
@@ -333,6 +358,29 @@ def test_a_vehicle_that_keeps_its_lane_is_not_said_to_change(roadmap: RoadMap, y
     lane = "in_0" if y < -3.2 else "in_1"
     assert {lanes[0] for lanes in result.lanes} == {lane}
     assert result.poses[0, -1, 1] == pytest.approx(lane_point(roadmap, lane, 80.0)[1], abs=0.05)
+
+
+def test_a_change_of_lanes_goes_on_by_the_likeliest_way(roadmap: RoadMap) -> None:
+    result = predicted(roadmap, Seen(-50.0, LEFT, drift=-1.0))
+    (change,) = {lanes for lanes in result.lanes if lanes[0] == "in_0"}
+    assert change[-1] == "bend_0"
+
+
+@pytest.mark.parametrize(
+    ("known", "slows"), [("", True), ('<param key="dvca.map.speed_limit" value="missing"/>', False)]
+)
+def test_nobody_is_taken_to_slow_down_for_a_limit_that_the_map_does_not_have(
+    plain: Callable[..., RoadMap],
+    known: str,
+    slows: bool,  # noqa: FBT001
+) -> None:
+    town = plain(
+        '<node id="a" x="0" y="0"/><node id="b" x="200" y="0"/><node id="c" x="400" y="0"/>',
+        f'<edge id="ab" from="a" to="b" speed="20"/><edge id="bc" from="b" to="c" speed="8">{known}</edge>',
+    )
+    x, y, heading = lane_point(town, "ab_0", 170.0)
+    poses = predicted(town, Seen(x, y, heading, speed=15.0)).poses[0]
+    assert (poses[-1, 0] - poses[0, 0] < 80.0) == slows
 
 
 def test_after_changing_lanes_the_new_lane_is_followed(roadmap: RoadMap) -> None:

@@ -3,6 +3,7 @@
 import functools
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from planned_drives import LIMIT, SHAPE, Actor, car, drive, predicted, road, stop_line
@@ -51,6 +52,20 @@ def test_ego_does_not_see_who_comes_until_it_is_past_who_hides_it(nose: float, s
     begin, end = blind(nose, BESIDE, speed=speed)
     assert begin == pytest.approx(100.0)
     assert 103.0 < end <= 106.0
+
+
+def test_where_the_map_has_no_limit_who_comes_is_taken_to_be_as_fast_as_in_a_town() -> None:
+    config, found = PlanningConfig(), []
+    for limit in (math.inf, config.urban_limit):
+        prior = (msgspec.structs.replace(MAJOR, speed_limit=limit),)
+        junctions = Junctions(road(stop_lines=[stop_line(100.0, Control.YIELD, prior=prior)]), SHAPE, config)
+        sights = Sights(SHAPE, config)
+        for time in (0.0, 0.1, 0.2):
+            look = predicted([BESIDE], time)
+            views = junctions.step(time, 90.0, 85.4, 8.0, {}, look.objects)
+            found.append(sights.blind(views, straight(90.0 - SHAPE.front), 8.0, look))
+    assert found[:3] == found[3:]
+    assert all(found)
 
 
 @pytest.mark.parametrize(
