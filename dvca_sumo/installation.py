@@ -16,7 +16,10 @@ def scenario_path(path: Path) -> Path:
 
     Without a folder `nets` the built-in ones are meant, so that the nearest of them can be told.
     """
-    if path.exists() or path.is_absolute() or path.parts[:1] != ("nets",):
+    try:
+        if path.exists() or path.is_absolute() or path.parts[:1] != ("nets",):
+            return path
+        built_in = folder("nets") / Path(*path.parts[1:])
+        return built_in if built_in.exists() or not path.parent.is_dir() else path
+    except OSError:  # who reads it says what is wrong with it
         return path
-    built_in = folder("nets") / Path(*path.parts[1:])
-    return built_in if built_in.exists() or not path.parent.is_dir() else path

@@ -10,11 +10,12 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from urllib.parse import unquote
 
 import msgspec
 
 from dvca_sumo.scenario.errors import ScenarioError
-from dvca_sumo.scenario.texts import read_by
+from dvca_sumo.scenario.texts import is_file, read_by
 
 # SUMO accepts options under several names; values here are the names SUMO prints in --help.
 SYNONYMS = {
@@ -105,8 +106,7 @@ class Configuration(msgspec.Struct, frozen=True):
         words = (
             value for name, value in self.options.items() if name not in self.outputs and not name.startswith("save-")
         )
-        named = (self.path.parent / part.strip() for value in words for part in re.split(r"[,;]", value))
-        return [path.resolve() for path in named if _is_file(path)]
+        return [path.resolve() for value in words for path in _listed(self.path, value) if is_file(path)]
 
 
 def read_configuration(path: Path) -> Configuration:
@@ -116,20 +116,20 @@ def read_configuration(path: Path) -> Configuration:
         ScenarioError: The file, or one that it names, is missing, cannot be read or is not XML, or it cannot be run
             by this tool (mesoscopic model, nothing but its options saved).
     """
-    path = path.resolve()
-    if path.is_dir():
-        raise ScenarioError(f"{path} is a folder, not a SUMO configuration")
-    if not path.is_file():
-        raise ScenarioError(f"no such SUMO configuration: {path}{_nearest(path)}")
-    with _reading(path):
+    with _reading(path.absolute()):
+        path = path.resolve()
+        if path.is_dir():
+            raise ScenarioError(f"{path} is a folder, not a SUMO configuration")
+        if not path.is_file():
+            raise ScenarioError(f"no such SUMO configuration: {path}{_nearest(path)}")
         try:
             root = ET.parse(path).getroot()  # noqa: S314 - the user's own file, read as SUMO itself reads it
         except (ET.ParseError, LookupError, ValueError) as error:  # the latter two of a foreign encoding
             raise ScenarioError(f"{path} is not well-formed XML: {error}") from None
     options: dict[str, str] = {}
     for element in root.iter():
-        value = element.get("value", element.get("v"))
-        if element is not root and value is not None:
+        value = element.get("value") or element.get("v") or _text_of(element)
+        if value:
             options[SYNONYMS.get(element.tag, element.tag)] = _VARIABLE.sub(_of_environment, value)
     if options.get("mesosim", "false").lower() in ("true", "1", "yes", "on"):
         raise ScenarioError(f"{path} asks for the mesoscopic model (mesosim), in which no ego can be moved")
@@ -148,6 +148,10 @@ def read_configuration(path: Path) -> Configuration:
     )
 
 
+def _text_of(element: ET.Element) -> str:
+    return "" if len(element) else (element.text or "").strip()  # SUMO forgets what stands before a child
+
+
 def _of_environment(name: re.Match[str]) -> str:
     return os.environ.get(name.group(1), "")  # as SUMO has it
 
@@ -164,18 +168,15 @@ def content_of(path: Path) -> str:
 
 
 @contextlib.contextmanager
-def _reading(path: Path) -> Iterator[None]:
+def _reading(path: Path, role: str = "") -> Iterator[None]:
     try:
         yield
+    except ScenarioError:
+        raise
     except OSError as error:
-        raise ScenarioError(f"{path} cannot be read: {error.strerror}") from None
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # what is too long to be a name, say
-        return False
+        raise ScenarioError(f"{path}{role} cannot be read: {error.strerror}") from None
+    except (RuntimeError, ValueError) as error:  # of links in a circle, and of a name with a null character
+        raise ScenarioError(f"{path}{role} cannot be read: {error}") from None
 
 
 def _read_by(path: Path) -> tuple[Path, ...]:
@@ -212,17 +213,28 @@ def seconds(text: str, option: str) -> float:
 
 
 def _files(config: Path, options: dict[str, str], name: str) -> tuple[Path, ...]:
-    paths = tuple(
-        (config.parent / part.strip()).resolve() for part in re.split(r"[,;]", options.get(name, "")) if part.strip()
-    )
-    for path in paths:
-        if not path.is_file():
-            raise ScenarioError(f"{config} names a file that does not exist ({name}): {path}{_nearest(path)}")
-    return paths
+    found: list[Path] = []
+    for path in _listed(config, options.get(name, "")):
+        with _reading(path, f" ({name} of {config})"):
+            file = path.resolve()
+            if not file.is_file():
+                raise ScenarioError(f"{config} names a file that does not exist ({name}): {file}{_nearest(file)}")
+        found.append(file)
+    return tuple(found)
+
+
+def _listed(config: Path, value: str) -> list[Path]:
+    """The paths that an option's value lists; SUMO encodes names, as those of URLs are, where it saves them."""
+    names = (unquote(part).strip() for part in re.split(r"[,;]", value))
+    return [config.parent / name for name in names if name]
 
 
 def _nearest(path: Path) -> str:
-    if not path.parent.is_dir():
+    try:
+        names = [entry.name for entry in path.parent.iterdir()]
+    except (FileNotFoundError, NotADirectoryError):
         return f" (no such folder: {path.parent})"
-    close = difflib.get_close_matches(path.name, [entry.name for entry in path.parent.iterdir()], n=1)
+    except OSError:  # of a folder that may be entered, but not listed
+        return ""
+    close = difflib.get_close_matches(path.name, names, n=1)
     return f" (did you mean {close[0]}?)" if close else ""

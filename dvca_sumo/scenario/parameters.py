@@ -56,6 +56,8 @@ def _parsed(text: str, path: Path) -> tuple[Parameter, ...]:
             around.pop()
             key = element.get("key", "") if element.tag == "param" else ""
             if key.startswith(_PREFIX):
+                if not around:
+                    raise ScenarioError(f"parameter {key} of nothing in {path} (allowed: {_ALLOWED})")
                 owner, name = around[-1].tag, around[-1].get("id", "")
                 if owner not in _VEHICLES:
                     raise ScenarioError(f"parameter {key} of {owner} {name!r} in {path} (allowed: {_ALLOWED})")

@@ -2,7 +2,8 @@
 
 Detectors, and devices of single vehicles, name their own output file, relative to the file they stand
 in. A run must not write into the user's folder, so files with such elements are copied with the output
-pointed to the null device and every relative input path made absolute.
+pointed to the null device and every relative input path made absolute. A file that only tells which edges
+such an output is about is not read.
 """
 
 import os
@@ -12,7 +13,7 @@ from pathlib import Path
 
 from dvca_sumo.scenario.configuration import Configuration
 from dvca_sumo.scenario.errors import ScenarioError
-from dvca_sumo.scenario.texts import READ, opened_text
+from dvca_sumo.scenario.texts import READ, is_file, opened_text
 
 # Element -> attribute with the path of a file that SUMO writes.
 WRITTEN = {
@@ -30,6 +31,7 @@ WRITTEN = {
     "calibrator": "output",
     "timedEvent": "dest",
 }
+_EDGES = "edgesFile"  # the one path of theirs that SUMO takes relative to its working folder, not to the file
 # Keys of parameters with the path of a file that SUMO writes.
 _LIGHT_FILE = "file"  # of an actuated traffic light: where its own detectors write
 _DEVICE_FILES = ("device.ssm.file", "device.toc.file")  # of vehicles and their types
@@ -74,8 +76,8 @@ def _silenced(path: Path, folder: Path) -> Path:
         read = READ.get(element.tag)
         source = element.get(read) if read is not None else None
         if read is not None and source:
-            target = (path.parent / source).resolve()
-            if element.tag == "include" and target.is_file():
+            target = (path.parent / source).absolute()
+            if element.tag == "include" and is_file(target):
                 target = _silenced(target, folder / str(number))
             element.set(read, str(target))
     folder.mkdir(parents=True, exist_ok=True)
@@ -88,6 +90,7 @@ def _silence(element: ET.Element) -> None:
     written = WRITTEN.get(element.tag)
     if written is not None and element.get(written):
         element.set(written, os.devnull)
+        element.attrib.pop(_EDGES, None)
     if element.tag == "param" and element.get("key") in _DEVICE_FILES:
         element.set("value", os.devnull)
     if element.tag == "tlLogic":

@@ -25,6 +25,14 @@ _NAMED = re.compile(
 )
 
 
+def is_file(path: Path) -> bool:
+    """Whether a file is there, as far as can be told; of words that can be no path (too long, say) there is none."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
+
+
 def opened_text(path: Path) -> str:
     """The text of a plain or gzipped file.
 
@@ -49,8 +57,7 @@ def read_by(path: Path) -> tuple[Path, ...]:
     Raises:
         ScenarioError: The file cannot be read.
     """
-    named = ((path.parent / name).resolve() for name in _NAMED.findall(opened_text(path)))
-    return tuple(one for one in dict.fromkeys(named) if one.is_file())
+    return _found(path.parent, _NAMED.findall(opened_text(path)))
 
 
 def texts_within(paths: tuple[Path, ...]) -> Iterator[tuple[Path, str]]:
@@ -66,7 +73,12 @@ def texts_within(paths: tuple[Path, ...]) -> Iterator[tuple[Path, str]]:
         if "<!--" in text:
             text = _COMMENT.sub(lambda comment: "\n" * comment.group().count("\n"), text)
         yield path, text
-        included = [(path.parent / name).resolve() for name in _INCLUDE.findall(text)]
-        fresh = [one for one in dict.fromkeys(included) if one not in seen and one.is_file()]
+        fresh = [one for one in _found(path.parent, _INCLUDE.findall(text)) if one not in seen]
         waiting.extend(fresh[::-1])
         seen.update(fresh)
+
+
+def _found(folder: Path, names: list[str]) -> tuple[Path, ...]:
+    """Those of the files named that are there, each once."""
+    named = (folder / name for name in names)
+    return tuple(dict.fromkeys(one.resolve() for one in named if is_file(one)))

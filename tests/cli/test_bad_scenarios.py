@@ -12,6 +12,7 @@ from dvca_sumo.cli import ExitCode
 
 Spoil = Callable[[Path], object]  # of the scenario's folder
 
+LONG = "n" * 300  # more than a name of a file can have
 MARKED = '<vehicle id="{0}" depart="0"><route edges="bc"/><param key="dvca.ego" value="true"/></vehicle>'
 
 
@@ -70,6 +71,10 @@ BROKEN = {
     "no net": Broken(("net-file", "net.net.xml", "does not exist"), _removed("net.net.xml")),
     "net cut off": Broken(("not a SUMO net", "net.net.xml"), _truncated("net.net.xml")),
     "net that is none": Broken(("not a SUMO net", "net.net.xml"), _replaced("net.net.xml", "<routes/>")),
+    "net of too long a name": Broken((LONG, "net-file", "run.sumocfg"), options=(("net_file", LONG),)),
+    "included file of too long a name": Broken(
+        (LONG,), additional=f'<include href="{LONG}"/><inductionLoop id="d" lane="bc_0" pos="3" period="9" file="o"/>'
+    ),
     "no route file": Broken(("route-files", "routes.rou.xml", "does not exist"), _removed("routes.rou.xml")),
     "route file cut off": Broken(("routes.rou.xml", "At line/column"), _truncated("routes.rou.xml")),
     "route file cut off within a vehicle": Broken(
@@ -111,6 +116,10 @@ BROKEN = {
         ("'ego' is of class rail", "road vehicles"),
         routes='<vType id="train" vClass="rail"/>' + EGO.replace("<trip", '<trip type="train"'),
     ),
+    "ego of a class that there is no map for": Broken(
+        ("unknown vehicle class 'ignoring'",),
+        routes='<vType id="any" vClass="ignoring"/>' + EGO.replace("<trip", '<trip type="any"'),
+    ),
     "threshold ill-typed": Broken(
         ("dvca.ttc", "'ego'", "'soon'", "allowed"),
         routes=EGO.replace("/>", '><param key="dvca.ttc" value="soon"/></trip>'),
@@ -139,6 +148,11 @@ BROKEN = {
         ("parameter dvca.ttc of route '' in ",),
         routes=EGO
         + '<vehicle id="car" depart="9"><route edges="bc"><param key="dvca.ttc" value="1"/></route></vehicle>',
+    ),
+    "parameter that is all of a file": Broken(
+        ("parameter dvca.ego of nothing in ", "extra.add.xml (allowed: of a vehicle, a trip or a flow)"),
+        _replaced("extra.add.xml", '<param key="dvca.ego" value="true"/>'),
+        additional="<poi/>",
     ),
     "parameter of a lane": Broken(
         ("parameter dvca.map.speed_limit of the lane 'bc_0' (allowed: dvca.map.speed_limit, of an edge)",),
@@ -171,6 +185,11 @@ def test_a_net_of_rails_only(
     edges = '<edge id="ab" from="a" to="b" allow="rail"/><edge id="bc" from="b" to="c" allow="rail"/>'
     config = scenario_file(tmp_path, plain_file(nodes, edges), '<trip id="ego" depart="0" from="ab" to="bc"/>')
     assert_one_error(typed(command, config), ExitCode.BAD_INPUT, *says)
+
+
+@pytest.mark.parametrize("folder", ["", "nets/"])
+def test_a_name_too_long_for_a_file_is_no_scenario(folder: str) -> None:
+    assert_one_error(typed("run", f"{folder}{LONG}.sumocfg"), ExitCode.BAD_INPUT, f"{folder}{LONG}.sumocfg")
 
 
 def test_a_folder_is_no_scenario(tmp_path: Path) -> None:

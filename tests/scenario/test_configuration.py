@@ -1,18 +1,21 @@
 """A sumocfg as SUMO reads it: option names, times, the files it names, and what cannot be run."""
 
 import os
+import re
 import shutil
 import subprocess
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 import sumolib
-from small_scenarios import scenario_file
+from command_line import contents
+from small_scenarios import driven, scenario_file
 
 from dvca_sumo.scenario import ScenarioError
 from dvca_sumo.scenario.configuration import OUTPUTS, SYNONYMS, content_of, read_configuration, seconds
+from dvca_sumo.violations import Ending
 
 UNREADABLE = Path("/proc/self/mem")  # by anybody: nothing lies at its beginning
 
@@ -61,6 +64,21 @@ def template(tmp_path_factory: pytest.TempPathFactory) -> ET.Element:
     return ET.parse(path).getroot()  # noqa: S314 written in the line above
 
 
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
+    """One whose permissions a test may take away."""
+    path = tmp_path / "folder"
+    path.mkdir()
+    yield path
+    path.chmod(0o700)
+
+
+def with_texts(config: Path) -> Path:
+    """The same configuration, its values written as the texts of its elements."""
+    config.write_text(re.sub(r'<([\w.-]+) value="([^"]*)"/>', r"<\1>\n  \2\n</\1>\n", config.read_text()))
+    return config
+
+
 def is_output(option: ET.Element) -> bool:
     return option.get("type") == "FILE" and (option.tag in OUTPUTS or option.tag.endswith("-output"))
 
@@ -90,6 +108,66 @@ def test_an_option_may_be_given_by_value_or_v_at_any_depth_and_under_a_short_nam
     configuration = read_configuration(config)
     assert configuration.net == net.resolve()
     assert configuration.options["begin"] == "0:0:10"
+
+
+def test_an_option_may_be_given_by_the_text_of_its_element(tmp_path: Path, net: Path) -> None:
+    values = scenario_file(tmp_path, net, begin="0:0:10", tripinfo="t.xml", load_state="some.net.xml")
+    by_value = read_configuration(values)
+    assert read_configuration(with_texts(values)) == by_value
+
+
+def test_text_counts_where_a_value_is_empty_and_not_where_there_is_one_or_a_child(tmp_path: Path, net: Path) -> None:
+    config = tmp_path / "run.sumocfg"
+    config.write_text(
+        f'<configuration>all<net-file v="{net}">n</net-file><log value="">l.txt</log>'
+        '<tripinfo-output>t.xml<seed value="3"/></tripinfo-output><verbose/><error-log> </error-log></configuration>'
+    )
+    assert read_configuration(config).options == {"net-file": str(net), "log": "l.txt", "seed": "3"}
+
+
+def test_nothing_is_written_beside_a_configuration_that_asks_for_it_by_texts(tmp_path: Path, street: Path) -> None:
+    config = with_texts(scenario_file(tmp_path, street, tripinfo_output="trips.xml", fcd_output="fcd.xml"))
+    before = contents(tmp_path)
+    assert driven(config).ending is Ending.ARRIVED
+    assert contents(tmp_path) == before
+
+
+def test_a_configuration_that_sumo_saved_names_the_files_that_it_was_saved_for(tmp_path: Path, street: Path) -> None:
+    """Blanks and % signs of their names are encoded in it."""
+    config = scenario_file(tmp_path, street)
+    net = Path(shutil.copy(street, tmp_path / "my 100%25.net.xml"))
+    routes = (tmp_path / "routes.rou.xml").rename(tmp_path / "two; words.rou.xml")
+    subprocess.run(  # noqa: S603 our own command
+        [sumolib.checkBinary("sumo"), "-n", net, "-r", routes, "--save-configuration", config],
+        check=True,
+        capture_output=True,
+    )
+    assert "my%20100%2525.net.xml" in config.read_text()
+    configuration = read_configuration(config)
+    assert (configuration.net, configuration.routes) == (net, (routes,))
+    assert driven(config).ending is Ending.ARRIVED
+
+
+@pytest.mark.parametrize(("given", "meant"), [("p%41q", "pAq"), ("p%2541q", "p%41q"), ("100%", "100%")])
+def test_a_percent_sign_is_one_of_the_name_only_where_it_encodes_nothing(
+    tmp_path: Path, street: Path, given: str, meant: str
+) -> None:
+    """As it is to SUMO."""
+    net = Path(shutil.copy(street, tmp_path / f"{meant}.net.xml"))
+    config = scenario_file(tmp_path, Path(f"{given}.net.xml"))
+    subprocess.run(  # noqa: S603 our own command
+        [sumolib.checkBinary("sumo"), "-c", config], check=True, capture_output=True
+    )
+    assert read_configuration(config).net == net
+
+
+def test_contents_are_those_of_files_with_encoded_names_too(tmp_path: Path, net: Path) -> None:
+    state = tmp_path / "my state.xml"
+    state.write_text("<snapshot/>")
+    configuration = read_configuration(scenario_file(tmp_path, net, load_state="my%20state.xml"))
+    before = configuration.contents
+    state.write_text("<snapshot />")
+    assert configuration.contents != before
 
 
 def test_lists_of_files_are_taken_apart_and_relative_to_the_configuration(tmp_path: Path, net: Path) -> None:
@@ -206,10 +284,54 @@ def test_a_missing_input_is_named_with_its_option(tmp_path: Path, net: Path, opt
         read_configuration(config)
 
 
+@pytest.mark.parametrize("name", ["n" * 300, "circle", "%00"])
+def test_a_name_that_cannot_be_that_of_a_file_is_told_with_its_option(tmp_path: Path, net: Path, name: str) -> None:
+    (tmp_path / "circle").symlink_to("circle")
+    config = scenario_file(tmp_path, net, route_files=name)
+    with pytest.raises(ScenarioError) as refused:
+        read_configuration(config)
+    for word in (str(config), "route-files", name.removesuffix("%00")):
+        assert word in str(refused.value)
+
+
+def test_a_configuration_in_a_circle_of_links_is_named(tmp_path: Path) -> None:
+    (tmp_path / "run.sumocfg").symlink_to("run.sumocfg")
+    with pytest.raises(ScenarioError, match=r"run\.sumocfg"):
+        read_configuration(tmp_path / "run.sumocfg")
+
+
+def test_a_file_in_a_folder_that_must_not_be_entered_is_named(tmp_path: Path, folder: Path) -> None:
+    net = folder / "some.net.xml"
+    net.write_text("<net/>")
+    inside, outside = scenario_file(folder, net), scenario_file(tmp_path, net)
+    folder.chmod(0o600)
+    if os.access(net, os.F_OK):
+        pytest.skip("for this user there is no such folder")
+    with pytest.raises(ScenarioError, match=r"run\.sumocfg"):
+        read_configuration(inside)
+    with pytest.raises(ScenarioError, match=r"some\.net\.xml.*net-file|net-file.*some\.net\.xml"):
+        read_configuration(outside)
+
+
+def test_a_folder_that_must_not_be_listed_suggests_nothing(folder: Path, net: Path) -> None:
+    scenario_file(folder, net)
+    folder.chmod(0o300)
+    if os.access(folder, os.R_OK):
+        pytest.skip("for this user there is no such folder")
+    with pytest.raises(ScenarioError, match=r"^no such SUMO configuration: \S+/run\.sumcfg$"):
+        read_configuration(folder / "run.sumcfg")
+
+
 @pytest.mark.parametrize("value", ["true", "1", "yes"])
 def test_the_mesoscopic_model_is_refused(tmp_path: Path, net: Path, value: str) -> None:
     with pytest.raises(ScenarioError, match="mesosim"):
         read_configuration(scenario_file(tmp_path, net, mesosim=value))
+
+
+def test_refused_options_are_refused_as_texts_too(tmp_path: Path, net: Path) -> None:
+    for option, value in (("mesosim", "true"), ("save-configuration", "out.xml")):
+        with pytest.raises(ScenarioError, match=option):
+            read_configuration(with_texts(scenario_file(tmp_path, net, **{option: value})))
 
 
 def test_mesosim_switched_off_is_not_refused(tmp_path: Path, net: Path) -> None:

@@ -6,9 +6,11 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
+from small_scenarios import driven, scenario_file
 
 from dvca_sumo.scenario import ScenarioError, silenced
 from dvca_sumo.scenario.silence import WRITTEN
+from dvca_sumo.violations import Ending
 
 
 def written(folder: Path, text: str, name: str = "a.add.xml") -> Path:
@@ -43,6 +45,16 @@ def test_the_file_of_every_kind_of_detector_goes_nowhere(
     root = copied(path, scratch)
     assert root[0].attrib == {"id": "d", attribute: os.devnull, "period": "60"}
     assert "out/d.xml" in path.read_text()
+
+
+@pytest.mark.parametrize("element", ["edgeData", "laneData"])
+def test_a_detector_of_the_edges_that_a_file_lists_is_no_hindrance(tmp_path: Path, street: Path, element: str) -> None:
+    """SUMO looks for that file in its working folder, which is not the user's in a run."""
+    (tmp_path / "edges.txt").write_text("edge:bc\n")
+    config = scenario_file(
+        tmp_path, street, additional=f'<{element} id="d" file="d.xml" edgesFile="edges.txt" period="1"/>'
+    )
+    assert driven(config).ending is Ending.ARRIVED
 
 
 def test_what_a_copied_file_reads_stays_where_it_is(tmp_path: Path, scratch: Path) -> None:
