@@ -1,8 +1,10 @@
 """What a component answers: checked, and no longer to be changed."""
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable, Iterable, Iterator
 from operator import attrgetter
-from typing import TypeVar, get_args, get_origin
+from types import NoneType
+from typing import NamedTuple, TypeVar, get_args, get_origin
 
 import msgspec
 import numpy as np
@@ -10,38 +12,61 @@ import numpy as np
 from dvca_sumo.messages import (
     PREDICTION_TIMES,
     TRAJECTORY_TIMES,
+    ControlCommand,
     Message,
+    PoseStep,
     PredictedObjects,
+    SignalColour,
     T,
     TrackedObjects,
     Trajectory,
 )
+from dvca_sumo.record import Digest
 
-Answer = TypeVar("Answer")
+Answer = TypeVar("Answer", bound=msgspec.Struct)
 
 _SAME_TIME = 1e-9  # [s]
+# What numbers may stand for those of an array, in numpy's letters. Longer ones have bytes that mean nothing.
+_CODES: dict[type[np.generic], str] = {
+    np.int64: np.typecodes["AllInteger"],
+    np.float64: np.typecodes["AllInteger"] + "efd",
+}
+# Classes that may stand for the type of a field, the first one for all of them in words; arrays are checked apart.
+_CLASSES = {float: (float, int, np.floating, np.integer), np.ndarray: (object,), NoneType: (PoseStep,)}
 
 
 def checked(answer: object, kind: type[Answer]) -> Answer:
-    """A component's answer, its arrays in the shapes that `messages` tells: a user's own stack may give anything.
+    """A component's answer, of the types and shapes that `messages` tells: a user's own stack may give anything.
 
-    Nobody can write to its arrays any more, be it through what they are views of: it is a message that was made.
+    Nobody can write to its arrays any more; see `freeze`.
     """
     if not isinstance(answer, kind):
         raise TypeError(f"its step returned {type(answer).__name__}, not {kind.__name__}")
-    for array_of in _ARRAYS[kind]:
-        array = array_of(answer)
-        while isinstance(array, np.ndarray):
-            array.setflags(write=False)
-            array = array.base
+    is_plain = _is_plain(answer, kind)
+    if is_plain and not _ARRAYS[kind]:
+        return answer  # numbers alone, 100 times a second
+    for array in _ARRAYS[kind]:
+        _freeze(array.of(answer), array)
     for name, found, wanted in _shapes(answer):
         if found != wanted:
             raise ValueError(f"the shape of its {name} is {found}, and must be {wanted}")
+    for name, items, item in _items(answer):
+        is_plain &= _are_plain(name, items, item)
+    if not is_plain:
+        Digest().step(answer)  # raises where a class of somebody's own has no bytes for a record
     if isinstance(answer, Trajectory):
         gap = float(np.abs(answer.points[:, T] - TRAJECTORY_TIMES).max())
         if gap > _SAME_TIME:
             raise ValueError(f"the times of its points are up to {gap:g} s off, and must be TRAJECTORY_TIMES")
     return answer
+
+
+def freeze(message: Message) -> None:
+    """Let nobody write to a message's arrays any more, be it through what they are views of: it was made."""
+    for kind, arrays in _ARRAYS.items():
+        if isinstance(message, kind):
+            for array in arrays:
+                _freeze(array.of(message), array)
 
 
 def told(error: BaseException) -> str:
@@ -73,15 +98,80 @@ def _shape(array: object) -> object:
     return array.shape if isinstance(array, np.ndarray) else f"that of a {type(array).__name__}"
 
 
-def _arrays(kind: type, prefix: str = "") -> Iterator[str]:
-    """Names of the arrays in a message of this kind, and in those that it holds."""
+def _freeze(array: object, wanted: "_Array") -> None:
+    if isinstance(array, np.ndarray) and array.dtype.char not in wanted.codes:
+        raise TypeError(f"its {wanted.name} are of type {array.dtype}, not {wanted.number.__name__}")
+    while isinstance(array, np.ndarray):
+        array.setflags(write=False)
+        array = array.base
+
+
+def _is_plain(message: msgspec.Struct, kind: type) -> bool:
+    """Whether the fields of a message are exactly of the types that its kind tells; what they hold is not looked at.
+
+    Raises:
+        TypeError: One is not even of a class that may stand for its type, as a number of numpy's may.
+    """
+    types, values = _TYPES[kind], msgspec.structs.astuple(message)
+    is_plain = type(message) is kind and tuple(map(type, values)) == types
+    if not is_plain:
+        for name, told_as, value in zip(message.__struct_fields__, types, values, strict=False):  # a subclass has more
+            classes = _CLASSES.get(told_as, (told_as,))
+            if not isinstance(value, (told_as, *classes)):
+                raise TypeError(f"its {name} is of type {type(value).__name__}, not {classes[0].__name__}")
+    if isinstance(message, PredictedObjects):
+        return _is_plain(message.objects, TrackedObjects) and is_plain
+    if isinstance(message, ControlCommand) and message.exact is not None:
+        return _is_plain(message.exact, PoseStep) and is_plain
+    return is_plain
+
+
+def _are_plain(name: str, items: Iterable[object], told_as: type) -> bool:
+    """As `_is_plain`, of the items of a collection."""
+    types = set(map(type, items))
+    for found in types:
+        if not issubclass(found, told_as):
+            raise TypeError(f"one of its {name} is of type {found.__name__}, not {told_as.__name__}")
+    return types <= {told_as}
+
+
+def _items(message: object) -> Iterator[tuple[str, Iterable[object], type]]:
+    """What the collections in a message hold: what it is called, and of which type it must be."""
+    if isinstance(message, TrackedObjects):
+        yield "signals", message.signals, str
+        yield "colours", message.signals.values(), SignalColour
+    elif isinstance(message, PredictedObjects):
+        yield from _items(message.objects)
+        yield "lanes", message.lanes, tuple
+        yield "lanes", itertools.chain.from_iterable(message.lanes), str
+
+
+class _Array(NamedTuple):
+    """In a message."""
+
+    of: Callable[[object], object]
+    name: str
+    number: type[np.generic]  # that it holds
+    codes: str  # of the numbers that it may hold
+
+
+def _arrays(kind: type, prefix: str = "") -> Iterator[_Array]:
+    """In a message of this kind, and in those that it holds."""
     for field in msgspec.structs.fields(kind):
+        name = prefix + field.name
         if get_origin(field.type) is np.ndarray:
-            yield prefix + field.name
+            (number,) = get_args(get_args(field.type)[1])  # of ndarray[shape, dtype[number]]
+            yield _Array(attrgetter(name), name, number, _CODES[number])
         elif isinstance(field.type, type) and issubclass(field.type, msgspec.Struct):
-            yield from _arrays(field.type, f"{prefix}{field.name}.")
+            yield from _arrays(field.type, f"{name}.")
 
 
-_ARRAYS: dict[type, tuple[Callable[[object], object], ...]] = {
-    kind: tuple(attrgetter(name) for name in _arrays(kind)) for kind in get_args(Message)
-}
+def _types(kind: type) -> Iterator[type]:
+    """Those of a kind's fields; that of nothing where one may hold that, as it mostly does."""
+    for field in msgspec.structs.fields(kind):
+        yield NoneType if NoneType in get_args(field.type) else get_origin(field.type) or field.type
+
+
+_KINDS: tuple[type, ...] = get_args(Message)
+_ARRAYS = {kind: tuple(_arrays(kind)) for kind in _KINDS}
+_TYPES = {kind: tuple(_types(kind)) for kind in (*_KINDS, PoseStep)}

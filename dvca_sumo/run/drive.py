@@ -23,7 +23,7 @@ from dvca_sumo.messages import (
 from dvca_sumo.oracles import Oracle, Places
 from dvca_sumo.oracles.no_progress import NoProgress
 from dvca_sumo.record import TICK, Digest, Execution, Record, moved_on
-from dvca_sumo.run.answers import checked, told
+from dvca_sumo.run.answers import checked, freeze, told
 from dvca_sumo.run.intervening import Intervening
 from dvca_sumo.run.task import Task
 from dvca_sumo.stack.reference import Stack, StackError
@@ -219,6 +219,8 @@ class Drive:
             published = self._intervening.published(message, self._occasion(component, index, message, moment))
         made.append(Execution(self._tick, published))
         if published is not None:
+            if published is not message:
+                freeze(published)
             setattr(self._channels, _CHANNELS[component], published)
 
     def _occasion(self, component: Component, index: int, message: Message, moment: Moment) -> Occasion:
