@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
+from dvca_sumo.geometry import randomness
 from dvca_sumo.geometry.randomness import key_of, normals, uniforms
 
+WORD = 2**64 - 1
 KEYS = np.arange(20_000)
 
 
@@ -25,6 +27,26 @@ def test_draws_are_the_same_on_every_machine() -> None:
 def test_any_other_part_of_the_key_gives_other_draws(other: tuple[int, int, int, int]) -> None:
     seed, stream, index, key = other
     assert not np.isin(uniforms(seed, stream, index, [key], 8), uniforms(7, 3, 11, [5], 8)).any()
+
+
+def test_the_largest_draw_is_less_than_one() -> None:
+    """As the middle of the last of 2^53 steps it would be rounded up."""
+    root = randomness._mixed(7)
+    for part in (3, 11):
+        root = randomness._mixed((root + randomness._GOLDEN & WORD) ^ part)
+    row = unmixed(unmixed(WORD) - randomness._GOLDEN & WORD)  # whose first draw has all bits
+    key = row ^ (root + randomness._GOLDEN & WORD)
+    assert uniforms(7, 3, 11, [key], 1)[0].tolist() == [1.0 - 2.0**-53]
+    assert normals(7, 3, 11, [key], 2).all()
+
+
+def unmixed(word: int) -> int:
+    """What SplitMix64's finalizer makes this word of."""
+    word ^= word >> 31 ^ word >> 62
+    word = word * pow(0x94D049BB133111EB, -1, 2**64) & WORD
+    word ^= word >> 27 ^ word >> 54
+    word = word * pow(0xBF58476D1CE4E5B9, -1, 2**64) & WORD
+    return word ^ word >> 30 ^ word >> 60
 
 
 def test_uniform_draws_fill_the_open_unit_interval_evenly() -> None:

@@ -3,7 +3,8 @@
 The factual run is driven once, by a process that leaves parked copies of itself on the way (see
 `branching`). A counterfactual is branched off the last copy before the first message that it
 substitutes. What cannot be branched goes to the replay engine: everything in jitter mode or with a
-stack that runs threads (`fallback` tells why), and single questions about another scenario or fault.
+stack that runs threads (`fallback` tells why), and all questions that are asked together where one of
+them is about another scenario or fault.
 """
 
 import contextlib

@@ -42,9 +42,13 @@ class Grove:
             OSError: The system gives no socket or no process.
         """
         is_short = len(os.fsencode(tempfile.gettempdir())) <= _LONGEST_FOLDER
-        self._folder = Path(tempfile.mkdtemp(prefix="dvca-sumo-fork-", dir=None if is_short else "/tmp"))  # noqa: S108
-        self._owner = os.getpid()
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            self._folder = Path(tempfile.mkdtemp(prefix="dvca-sumo-fork-", dir=None if is_short else "/tmp"))  # noqa: S108
+        except OSError:
+            self._listener.close()
+            raise
+        self._owner = os.getpid()
         self._connections: list[Connection] = []
         self.checkpoints: list[Checkpoint] = []  # as far as was heard of them
         self.memory = Memory()  # of the checkpoints

@@ -6,7 +6,6 @@ child outlives its parent.
 
 import contextlib
 import ctypes
-import itertools
 import multiprocessing
 import os
 import pickle
@@ -48,29 +47,35 @@ class _Child(Generic[Result]):
 
     def __init__(self, index: int, job: Callable[[], Result], log: Path, timeout: float) -> None:
         self.index = index
-        self.log = log
         self.deadline = time.monotonic() + timeout
+        self._log = log
+        self._timeout = timeout
         self.receiver, sender = _CONTEXT.Pipe(duplex=False)
-        self.process: BaseProcess = _CONTEXT.Process(target=_work, args=(job, sender, log, os.getpid()))
-        self.process.start()
-        sender.close()
+        self._process: BaseProcess = _CONTEXT.Process(target=_work, args=(job, sender, log, os.getpid()))
+        try:
+            self._process.start()
+        finally:
+            sender.close()
 
     def collect(self) -> Result | Failure:
-        """Its result; called when the pipe has something to say or is closed."""
+        """Its result; called when the pipe has something to say or is closed, or when it is late, which ends it."""
+        if not self.receiver.poll():
+            self.kill()
+            return Failure(f"no answer within {self._timeout:g} s", said_in(self._log))
         try:
             answer: Result | Failure = self.receiver.recv()
         except (EOFError, OSError):  # the latter when it died in the middle of its answer
-            self.process.join()
-            return Failure(death(self.process.exitcode), said_in(self.log))
-        self.process.join()
+            self._process.join()
+            return Failure(death(self._process.exitcode), said_in(self._log))
+        self._process.join()
         if isinstance(answer, Failure):
-            return Failure(answer.reason, said_in(self.log), answer.error)
+            return Failure(answer.reason, said_in(self._log), answer.error)
         return answer
 
     def kill(self) -> None:
         """End it now."""
-        self.process.kill()
-        self.process.join()
+        self._process.kill()
+        self._process.join()
 
 
 def isolated(
@@ -80,30 +85,41 @@ def isolated(
 
     Yields (row of the job, its result or `Failure`) as they finish. The next job is taken from `jobs` when
     there is room for it, so that what was found so far may decide whether there is one. A job that takes longer than
-    `timeout` [s] is killed. Leaving the iterator early, by any exception, kills what still runs.
+    `timeout` [s] is killed, unless its answer is there when that is noticed. Leaving the iterator early, by any
+    exception, kills what still runs.
     """
     waiting = enumerate(jobs)
     running: list[_Child[Result]] = []
-    with tempfile.TemporaryDirectory(prefix="dvca-sumo-log-") as folder:
+    # No answer is worth less for a folder that the system does not let go of.
+    with tempfile.TemporaryDirectory(prefix="dvca-sumo-log-", ignore_cleanup_errors=True) as folder:
         try:
             while True:
-                for index, job in itertools.islice(waiting, parallel - len(running)):
-                    with _no_interrupts():
-                        running.append(_Child(index, job, Path(folder) / str(index), timeout))
+                while len(running) < parallel and (work := next(waiting, None)) is not None:
+                    refusal = _start(running, *work, Path(folder), timeout)
+                    if refusal is not None:
+                        yield work[0], refusal
                 if not running:
                     return
                 remaining = min(child.deadline for child in running) - time.monotonic()
                 ready = wait([child.receiver for child in running], max(remaining, 0.0))
-                for child in [one for one in running if one.receiver in ready]:
+                for child in [one for one in running if one.receiver in ready or time.monotonic() > one.deadline]:
                     running.remove(child)
                     yield child.index, child.collect()
-                for child in [one for one in running if time.monotonic() > one.deadline]:
-                    running.remove(child)
-                    child.kill()
-                    yield child.index, Failure(f"no answer within {timeout:g} s", said_in(child.log))
         finally:
             for child in running:
                 child.kill()
+
+
+def _start(
+    running: list[_Child[Result]], index: int, job: Callable[[], Result], folder: Path, timeout: float
+) -> Failure | None:
+    """Add a job to those that run; why it cannot, where the system has no room for it."""
+    try:
+        with _no_interrupts():  # or a child that has just been forked is not among those that one ends
+            running.append(_Child(index, job, folder / str(index), timeout))
+    except OSError as error:
+        return Failure(f"the system gives no process or pipe: {error}", "")
+    return None
 
 
 @contextlib.contextmanager

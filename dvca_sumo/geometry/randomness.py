@@ -15,6 +15,7 @@ Words = npt.NDArray[np.uint64]
 
 _GOLDEN = 0x9E3779B97F4A7C15
 _WORD = 0xFFFFFFFFFFFFFFFF
+_LARGEST = 1.0 - 2.0**-53  # the middle of the last of 2^53 steps itself would be rounded to 1
 
 
 def _mix(words: Words) -> Words:
@@ -44,7 +45,7 @@ def uniforms(seed: int, stream: int, index: int, keys: npt.ArrayLike, count: int
         root = _mixed(((root + _GOLDEN) & _WORD) ^ (part & _WORD))
     rows = _mix(np.uint64((root + _GOLDEN) & _WORD) ^ np.atleast_1d(np.asarray(keys, dtype=np.uint64)))
     words = _mix(rows[:, None] + np.arange(1, count + 1, dtype=np.uint64) * np.uint64(_GOLDEN))
-    return ((words >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
+    return np.minimum(((words >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53, _LARGEST)
 
 
 def normals(seed: int, stream: int, index: int, keys: npt.ArrayLike, count: int) -> npt.NDArray[np.float64]:

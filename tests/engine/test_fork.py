@@ -2,6 +2,7 @@
 
 import math
 import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -36,6 +37,12 @@ FULL_THROTTLE = "small_stacks:full_throttle"
 @pytest.fixture
 def task(tmp_path: Path, street: Path) -> Task:
     return factual(tmp_path, street)
+
+
+@pytest.fixture
+def short_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One whose path is not too long for that of a socket in it."""
+    return tmp_path_factory.mktemp("t")
 
 
 def test_pythons_own_random_numbers_go_on_in_a_branch(task: Task, street: Path) -> None:
@@ -184,20 +191,22 @@ def test_a_thread_that_is_started_later_leaves_the_checkpoints_before_it(task: T
         assert_as_replayed(engine, street, "forking_stacks:threaded_late", ideal(task, 3.0, PERCEPTION))
 
 
-@pytest.mark.parametrize("name", ["fork", "pipe"])
+@pytest.mark.parametrize(("where", "name"), [(os, "fork"), (grove, "Pipe"), (socket, "socket"), (tempfile, "mkdtemp")])
 def test_a_system_without_processes_or_descriptors_to_give_is_no_error(
-    task: Task, street: Path, monkeypatch: pytest.MonkeyPatch, name: str
+    task: Task, street: Path, short_folder: Path, monkeypatch: pytest.MonkeyPatch, where: object, name: str
 ) -> None:
-    def refuse() -> int:
+    def refuse(*_words: object, **_settings: object) -> int:
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
     with fork_engine(street) as engine, monkeypatch.context() as patch:
         replayed = engine.witness.record(task)
         patch.setattr(engine.witness, "record", lambda _task: replayed)
-        patch.setattr(*((os, "fork") if name == "fork" else (grove, "Pipe")), refuse)
+        patch.setattr(tempfile, "tempdir", str(short_folder))
+        patch.setattr(where, name, refuse)
         assert engine.record(task) is replayed
         assert engine.fallback is not None
         assert "the system gives no process or socket" in engine.fallback
+    assert list(short_folder.iterdir()) == []
 
 
 def test_a_long_path_of_the_folder_for_temporary_files_does_not_matter(
@@ -212,15 +221,14 @@ def test_a_long_path_of_the_folder_for_temporary_files_does_not_matter(
 
 
 def test_nothing_is_left_in_the_folder_for_temporary_files(
-    task: Task, street: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    task: Task, street: Path, short_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    monkeypatch.setattr(tempfile, "tempdir", str(short_folder))
     with fork_engine(street) as engine:
         engine.record(task)
+        assert list(short_folder.iterdir()) != []
         glimpses(engine, ideal(task, 1.0, PREDICTION), ideal(task, 1.0, CONTROL))
-    assert list(folder.iterdir()) == []
+    assert list(short_folder.iterdir()) == []
 
 
 def test_thinned_checkpoints_are_near_to_every_age_and_few() -> None:

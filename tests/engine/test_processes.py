@@ -1,18 +1,23 @@
 """Jobs in processes of their own: whatever one of them does costs that one alone."""
 
 import faulthandler
+import itertools
 import os
+import resource
 import select
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from dvca_sumo.engine import processes
 from dvca_sumo.engine.processes import Failure, isolated
 
 LONG = 60.0  # [s] only ever reached by a defect
@@ -99,6 +104,32 @@ def test_a_hanging_job_is_ended_and_the_others_give_their_answer() -> None:
     assert hung.said == "waiting for ever"
 
 
+def test_an_answer_that_is_there_counts_though_nobody_looked_in_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The machine was suspended, or whoever takes the answers had other things to do."""
+    clock = [0.0]
+    monkeypatch.setattr(processes, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader, writer = os.pipe()
+
+    def hang() -> None:
+        os.close(writer)
+        signal.pause()
+
+    results = isolated([lambda: "in time", pipe.read_text, hang], 3, LONG)
+    assert next(results) == (0, "in time")
+    os.close(writer)
+    pipe.write_text("late")
+    assert os.read(reader, 1) == b""  # the second one has ended
+    os.close(reader)
+    clock[0] = 2.0 * LONG
+    assert next(results) == (1, "late")
+    (hung,) = results
+    assert hung == (2, Failure("no answer within 60 s", ""))
+
+
 def test_an_exception_is_the_answer_with_its_words() -> None:
     def fail() -> None:
         raise FileNotFoundError(2, "no such thing", "map.xml")
@@ -146,6 +177,44 @@ def test_a_job_that_dies_in_the_middle_of_its_answer_is_a_failure() -> None:
 def test_a_long_answer_arrives_whole() -> None:
     (answer,) = answers([lambda: bytes(5_000_000)])
     assert len(answer) == 5_000_000
+
+
+@pytest.mark.parametrize("parallel", [1, 2, 3])
+@pytest.mark.parametrize("refused", [{0}, {1}, {2}, {0, 1}, {0, 1, 2}])
+def test_a_job_that_the_system_has_no_process_for_is_a_failure_and_the_others_give_their_answer(
+    parallel: int, refused: set[int]
+) -> None:
+    fork, asked = os.fork, itertools.count()
+
+    def scarce_fork() -> int:
+        if next(asked) in refused:
+            raise BlockingIOError(11, "Resource temporarily unavailable")
+        return fork()
+
+    def starve() -> list[Any]:  # in a process of its own: Python leaves pipes open there
+        os.fork = scarce_fork
+        return answers([partial(int, number) for number in range(3)], parallel)
+
+    (starved,) = answers([starve])
+    for row, answer in enumerate(starved):
+        if row in refused:
+            assert isinstance(answer, Failure)
+            assert answer.reason.startswith("the system gives no process or pipe: ")
+            assert "Resource temporarily unavailable" in answer.reason
+        else:
+            assert answer == row
+
+
+def test_jobs_that_the_system_has_no_pipe_for_are_failures() -> None:
+    def starve() -> list[Any]:
+        lowest = os.dup(2)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (lowest + 1, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+        os.close(lowest)  # the only one that is left
+        return answers([int, int, int])
+
+    (starved,) = answers([starve])
+    assert [type(one) for one in starved] == [Failure] * 3
+    assert all("Too many open files" in one.reason for one in starved)
 
 
 def test_jobs_run_at_once_but_never_more_than_allowed(tmp_path: Path) -> None:

@@ -112,7 +112,7 @@ class Session:
             return 0.0
 
     def has(self, vehicle: str) -> bool:
-        """Whether the vehicle is in the simulation (inserted and not removed)."""
+        """Whether the vehicle is in the simulation (loaded, inserted or not yet, and not removed)."""
         return has(vehicle)
 
     def entry(self, vehicle: str, settings: Sequence[str]) -> Entry:

@@ -6,7 +6,7 @@ SHADOW = "dvca.shadow"  # vehicle type of what stands for an ego on a second lan
 
 
 def has(vehicle: str) -> bool:
-    """Whether the vehicle is in the simulation (inserted and not removed)."""
+    """Whether the vehicle is in the simulation (loaded, inserted or not yet, and not removed)."""
     try:
         libsumo.vehicle.getRoadID(vehicle)
     except libsumo.TraCIException:
