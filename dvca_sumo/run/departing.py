@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from dvca_sumo.oracles import Places, judges
-from dvca_sumo.roadmap import RoadMap, Route, RouteError
+from dvca_sumo.roadmap import RoadMap, RoadMapError, Route, RouteError
 from dvca_sumo.run.drive import ARRIVED_WITHIN, Drive, Judging
 from dvca_sumo.run.task import Task
 from dvca_sumo.scenario import MARK, Definitions, Parameter, Scenario, ScenarioError
@@ -75,7 +75,10 @@ class Departing:
             ScenarioError: Its definition holds an arrival that is none.
         """
         roadmap, edges = self._roadmap_of(entry.vehicle_class), self.edges(entry)
-        arrival = self.definitions.arrival_position(entry.ego, roadmap.lanes[f"{edges[-1]}_0"].length)
+        last = roadmap.lanes.get(f"{edges[-1]}_0")
+        if last is None:
+            raise RouteError(f"edge {edges[-1]!r}, its last one, is not on the road map")
+        arrival = self.definitions.arrival_position(entry.ego, last.length)
         return roadmap.route(edges, entry.lane, entry.position, None, arrival)
 
     def judging(self, entry: Entry, route: Route) -> Judging:
@@ -124,7 +127,7 @@ class Departing:
     def _is_fit(self, entry: Entry) -> bool:
         try:
             route = self.route(entry)
-        except (RouteError, ScenarioError):
+        except (RouteError, RoadMapError, ScenarioError):
             return False
         return route.destination - route.start >= _SHORTEST_AUTO_TRIP
 

@@ -8,7 +8,7 @@ import msgspec
 
 from dvca_sumo.engine.replay import roadmap
 from dvca_sumo.geometry.randomness import key_of, uniforms
-from dvca_sumo.roadmap import RouteError
+from dvca_sumo.roadmap import RoadMapError, RouteError
 from dvca_sumo.run import Departing, free_flow, opened, patience
 from dvca_sumo.scenario import Scenario, ScenarioError
 from dvca_sumo.stack.reference import reference_stack
@@ -142,7 +142,7 @@ def _trip(entry: Entry, departing: Departing, durations: Mapping[str, float], en
         route = departing.route(entry)
     except ScenarioError:
         return "without a known destination"
-    except (RouteError, KeyError):
+    except (RouteError, RoadMapError):
         return "without a drivable route"
     length = route.destination - route.start
     if length < SHORTEST:

@@ -211,6 +211,30 @@ def test_auto_takes_a_trip_that_is_long_enough_to_an_end_that_is_known(tmp_path:
     assert record.route.destination - record.route.start > 500.0
 
 
+@pytest.fixture
+def ending_nowhere(tmp_path: Path, street: Path) -> Path:
+    """Two that depart for long trips; the first one shall arrive on an edge that is there for SUMO's router alone."""
+    text = street.read_text().replace('<edge id="bn" ', '<edge id="bn" function="connector" ')
+    assert text != street.read_text()
+    (tmp_path / "connector.net.xml").write_text(text)
+    routes = "".join(
+        f'<vehicle id="{name}" depart="{depart}" arrivalEdge="{row}"><route edges="{edges}"/></vehicle>'
+        for name, depart, row, edges in (("nowhere", 60, 3, "ab bc cb bn nb bs"), ("long", 65, 3, "ab bc cb ba"))
+    )
+    return scenario_file(tmp_path, tmp_path / "connector.net.xml", routes)
+
+
+def test_an_ego_that_shall_arrive_on_no_road_is_refused(ending_nowhere: Path) -> None:
+    with pytest.raises(ScenarioError) as raised:
+        driven(ending_nowhere, ego="nowhere")
+    words = "the ego 'nowhere' has no drivable route: edge 'bn', its last one, is not on the road map"
+    assert str(raised.value) == words
+
+
+def test_auto_passes_over_a_trip_that_ends_on_no_road(ending_nowhere: Path) -> None:
+    assert driven(ending_nowhere, ego="auto", stop=StopRule(at=67.0)).ego == "long"
+
+
 def test_whether_a_variable_signs_limit_was_kept_is_not_known(tmp_path: Path, street: Path) -> None:
     sign = '<variableSpeedSign id="v" lanes="bc_0 bc_1"><step time="0" speed="5"/></variableSpeedSign>'
     record = driven(scenario_file(tmp_path, street, additional=sign))

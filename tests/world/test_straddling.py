@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 from small_scenarios import in_child, scenario_file
-from watched_world import STEP
+from watched_world import STEP, entered
 
 from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.geometry.boxes import box_of, distances
@@ -19,6 +19,7 @@ from dvca_sumo.scenario import load_scenario
 from dvca_sumo.truth import EgoTruth, ObjectsTruth
 from dvca_sumo.world import Ego, VehicleLimits, World
 from dvca_sumo.world.straddling import taken
+from dvca_sumo.world.ways import End
 
 NODES = '<node id="b" x="0" y="0"/><node id="c" x="300" y="0"/>'
 EDGES = '<edge id="bc" from="b" to="c" speed="13.9" numLanes="2" width="4"/>'
@@ -87,11 +88,16 @@ TURNING = BULGING.replace('to="bs"', 'to="ba"')
 ONTO_EDGES = NEARBY_EDGES.replace('id="ba" from="b" to="a"', 'id="be" from="b" to="e" shape="0,{0} -200,{0}"')
 ONTO_NODES = CROSS_NODES + '<node id="e" x="-200" y="-30"/>'
 ONTO = TURNING.replace('to="ba"', 'to="be"')
+# Two lanes lead on, of which the left one is there to pass on, or where a further road leads off.
+ALONG_NODES = CROSS_NODES + '<node id="e" x="200" y="200"/>'
+ALONG_EDGES = CROSS_EDGES.replace('numLanes="5"', 'numLanes="1"') + '<edge id="ce" from="c" to="e" speed="13.9"/>'
+ALONG_WAYS = '<connection from="bc" to="ce" fromLane="1" toLane="0"/>'
 WALKING = """
 <trip id="ego" from="bc" to="bc" depart="0" departPos="40" departSpeed="0"/>
 <person id="walker" depart="0" departPos="70"><walk from="bc" to="bc" arrivalPos="200"/></person>"""
 OUT, BACK = 15, 250  # steps after which it stands across the lanes, and goes back to its own
 ASIDE = 2.1  # [m] its front is over the edge then
+BESIDE_IT = 1.0  # [m] who is nearer to it stands beside it, not behind it
 
 
 class Drive:
@@ -169,6 +175,30 @@ def test_who_comes_from_the_lane_beside_stops_on_the_junction_behind_an_ego_that
 ) -> None:
     net = plain_file(CROSS_NODES, CROSS_EDGES)
     assert _is_stopped_for(tmp_path, net, CROSSING, lambda lane: lane.startswith(":"), 11.0, aside) is stops
+
+
+@pytest.mark.parametrize(
+    ("edges", "aside", "origin"),  # [m] to the left of its route's line
+    [("ab bc", 3.2, "ab_1"), ("ab bc ce", -3.2, "ab_0")],
+    ids=["on a lane to pass on", "before a change of lanes"],
+)
+def test_an_ego_beside_its_route_has_come_by_the_lane_that_leads_to_where_its_front_is(
+    tmp_path: Path, plain_file: Callable[..., Path], edges: str, aside: float, origin: str
+) -> None:
+    net = plain_file(ALONG_NODES, ALONG_EDGES, ALONG_WAYS)
+    trip = f'<vehicle id="ego" depart="0" departLane="0" departSpeed="0"><route edges="{edges}"/></vehicle>'
+    entry = entered(scenario_file(tmp_path, net, trip))
+    route = RoadMap.load(net).route(entry.edges, entry.lane, entry.position, None, 100.0)
+    ego = Ego(entry, route, VehicleLimits())
+    junction = route.stop_lines[0]
+    rear = 0.5 * (junction.station + junction.exit_station) - ego.shape.front
+    for station in [*np.arange(ego.station(), rear).tolist(), rear, rear]:
+        move = _to(route.line.poses(np.array([station]), aside)[0].tolist(), ego.truth)
+        ego.vehicle.advance(ControlCommand(0.0, 0.0, 0.0, move), STEP)
+        lane = ego.lane()
+    assert lane.startswith(":b_")
+    assert lane not in route.lane_ids
+    assert ego.straddled(lane)[0] == End(lane, origin)
 
 
 @pytest.mark.parametrize(("past", "stops"), [(1.0, True), (2.0, False)])  # [m] the front is beyond the junction
@@ -334,6 +364,28 @@ def test_who_is_already_beside_it_drives_on(tmp_path: Path, plain_file: Callable
         return drive.gaps
 
     assert in_child(job)[-1] == math.inf  # out of sight
+
+
+def test_who_is_already_beside_it_drives_on_along_lanes_that_are_drawn_longer_than_they_count(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    net = plain_file(NODES, EDGES.replace("speed", 'length="200" speed'))
+
+    def job() -> tuple[list[float], set[str]]:
+        import libsumo  # noqa: PLC0415 one simulation a process: never in the tests' own
+
+        drive = Drive(tmp_path, net, BESIDE.replace('"98"', '"130"'), position=130.0)
+        shadowed = set[str]()
+        for _ in range(BACK):
+            drive.go(1)
+            if drive.gaps[-1] < BESIDE_IT:
+                shadowed |= {*libsumo.vehicle.getIDList()} - {"ego", "other"}
+        return drive.gaps, shadowed
+
+    gaps, shadowed = in_child(job)
+    assert min(gaps) < BESIDE_IT
+    assert shadowed == set()
+    assert gaps[-1] == math.inf  # out of sight
 
 
 def test_the_sub_lane_model_needs_nothing_more(tmp_path: Path, plain_file: Callable[..., Path]) -> None:
