@@ -48,8 +48,6 @@ def sightings(folder: Path, net: Path, trips: str, moves: Sequence[PoseStep]) ->
         found = []
         for move in moves:
             step(world, {ego: move, other: STANDING})
-            if not libsumo.vehicle.getLaneID("ego"):
-                continue  # to SUMO it is nowhere on the net, and near nobody
             moment = world.observe(other)
             row, truth = objects_of(moment)["ego"], ego.truth
             ahead = np.array([math.cos(truth.heading), math.sin(truth.heading)])
@@ -112,3 +110,11 @@ def test_one_swings_out_beyond_its_lane(tmp_path: Path, plain_file: Callable[...
     net = plain_file(ROAD, TWO_LANES.replace(' numLanes="2" width="4"', ""))
     trips = trip("ego", "bc", 100.0) + trip("other", "bc", 80.0)
     assert_true(sightings(tmp_path, net, trips, [PoseStep(0.2, -0.05, 0.0, 0.0)] * 80))
+
+
+def test_one_is_beside_the_road_where_sumo_has_it_near_nobody(tmp_path: Path, plain_file: Callable[..., Path]) -> None:
+    net = plain_file(ROAD, TWO_LANES.replace(' numLanes="2" width="4"', ""))
+    trips = trip("ego", "bc", 100.0) + trip("other", "bc", 80.0)
+    for seen in sightings(tmp_path, net, trips, [PoseStep(0.2, -0.2, 0.0, 0.0)] * 40 + [STANDING] * 20):
+        assert seen.box == pytest.approx(seen.true_box, abs=1e-6)
+        assert seen.velocity == pytest.approx(seen.true_velocity, abs=0.3)  # told, where it was moved sideways

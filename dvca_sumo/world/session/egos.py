@@ -1,7 +1,7 @@
 """Egos: SUMO is told where they are, and its drivers what they have to mind of them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import libsumo
@@ -75,6 +75,9 @@ class Egos:
 
     def __contains__(self, vehicle: str) -> bool:
         return vehicle in self._adopted
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._adopted)
 
     def adopt(self, entry: Entry) -> None:
         """Take an inserted vehicle out of SUMO's hands.

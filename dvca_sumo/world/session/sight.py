@@ -1,5 +1,6 @@
 """What is near the vehicles that are watched."""
 
+import math
 import sys
 from collections.abc import Callable
 from typing import NamedTuple
@@ -54,19 +55,21 @@ class Sight:
         self._egos = egos
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
+        self._radii: dict[str, float] = {}  # [m] likewise
+        self._strays: tuple[str, ...] | None = None  # egos that SUMO has on no lane, and near nobody; None: not asked
         self._vehicles, self._people = _Readings(self._vehicle_now), _Readings(self._person_now)
         self._footing = Footing(self._walking_area)
 
     def watch(self, vehicle: str, radius: float) -> None:
         """Have `objects` ready for a vehicle: what is within `radius` [m] of it. To others it stays as long as now."""
         self._vehicle(vehicle)
-        self._crowds[vehicle] = Crowd()
+        self._crowds[vehicle], self._radii[vehicle] = Crowd(), radius
         libsumo.vehicle.subscribeContext(vehicle, tc.CMD_GET_VEHICLE_VARIABLE, radius, (_VEHICLE,))
         libsumo.vehicle.subscribeContext(vehicle, tc.CMD_GET_PERSON_VARIABLE, radius, (_PERSON,))
 
     def forget(self, vehicle: str) -> None:
         """Watch it no longer; SUMO gives up at the next step where that is removed which it is to look around."""
-        del self._crowds[vehicle]
+        del self._crowds[vehicle], self._radii[vehicle]
         if has(vehicle):
             for kind in (tc.CMD_GET_VEHICLE_VARIABLE, tc.CMD_GET_PERSON_VARIABLE):
                 libsumo.vehicle.unsubscribeContext(vehicle, kind, 0.0)
@@ -75,6 +78,7 @@ class Sight:
         """SUMO has made a step: everything is elsewhere."""
         self._vehicles.clear()
         self._people.clear()
+        self._strays = None
 
     def objects(self, watched: str) -> tuple[ObjectsTruth, list[str]]:
         """Every moving body near a watched vehicle: vehicles (parked ones too), people on foot.
@@ -87,6 +91,7 @@ class Sight:
                 seen += self._vehicles[name]
             if _PERSON in kinds:
                 seen += self._people[name]
+        seen += self._strays_near(watched)
         names, motions = [one.name for one in seen], [number for one in seen for number in one.motion]
         # People whose places SUMO leaves open, by row.
         edges = {
@@ -102,6 +107,15 @@ class Sight:
                 motions[4 * row : 4 * row + 2] = place
         found = self._crowds[watched].seen(time, names, motions, [one.lane for one in seen], self._bodies)
         return found, [one.ground for one in seen]
+
+    def _strays_near(self, watched: str) -> list[_Seen]:
+        if self._strays is None:
+            self._strays = tuple(ego for ego in self._egos if not libsumo.vehicle.getLaneID(ego))
+        if not self._strays:
+            return []
+        place, radius = libsumo.vehicle.getPosition(watched), self._radii[watched]
+        others = (one for name in self._strays if name != watched for one in self._vehicles[name])
+        return [one for one in others if math.dist(one.motion[:2], place) <= radius]
 
     def _walking_area(self, edge: str) -> tuple[Shape, list[Strip]]:
         """The outline of a walking area, and the lanes of vehicles at its junction."""
