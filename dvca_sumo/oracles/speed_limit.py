@@ -59,9 +59,10 @@ class SpeedLimit:
 
     def _aside(self, place: Place, moment: Moment) -> Lane | None:
         """The lane beside the route's that the ego is on, of the same road; None where it is not on one."""
-        route, row, lanes = self._places.route, place.row, self._places.roadmap.lanes
+        route, row = self._places.route, place.row
         if not place.is_on_route or route.lane_right[row] <= place.offset <= route.lane_left[row]:
             return None
+        lanes = self._places.roadmap.lanes
         own, found = (lanes.get(name or "") for name in (route.lane_ids[row], self._places.lane(moment)))
         if own is None or found is None or own.is_internal or own.edge != found.edge:
             return None

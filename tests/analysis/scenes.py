@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from interventions.scenes import Thing, ego, estimate, moment, occasion, predicted, road, tracked, trajectory, walker
@@ -34,6 +34,8 @@ Answers = Callable[[Task], Glimpse | Failure]
 
 class BareMap:
     """A map without lanes beside the route."""
+
+    lanes: ClassVar[dict[str, Any]] = {}
 
     def lanes_near(self, points: np.ndarray, radius: float) -> list[tuple[str, ...]]:  # noqa: ARG002
         return [() for _ in points]
