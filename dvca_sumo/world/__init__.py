@@ -108,7 +108,7 @@ class World:
     def adopt(self, entry: Entry, route: Route, limits: VehicleLimits) -> Ego:
         """Take a vehicle that has just departed out of SUMO's hands, and its own stops off it."""
         self._session.skip_stops(entry.ego)
-        self._session.adopt(entry, SURROUNDINGS)
+        self._session.adopt(entry)
         ego = Ego(entry, route, limits)
         self._egos.append(ego)
         return ego
@@ -116,7 +116,7 @@ class World:
     def watch(self, entry: Entry, route: Route) -> Native:
         """Look at a vehicle that has just departed and stays in SUMO's hands; like an ego it makes no stops."""
         self._session.skip_stops(entry.ego)
-        self._session.watch(entry.ego, SURROUNDINGS)
+        self._session.watch(entry.ego)
         return Native(entry, route)
 
     def follow(self, native: Native) -> bool:

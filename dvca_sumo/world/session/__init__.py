@@ -183,14 +183,14 @@ class Session:
         for _ in libsumo.vehicle.getStops(vehicle):
             libsumo.vehicle.replaceStop(vehicle, 0, "")
 
-    def adopt(self, entry: Entry, radius: float) -> None:
-        """Take an inserted vehicle out of SUMO's hands, and watch what is within `radius` [m] of it."""
+    def adopt(self, entry: Entry) -> None:
+        """Take an inserted vehicle out of SUMO's hands, and watch its surroundings."""
         self.egos.adopt(entry)
-        self.watch(entry.ego, radius)
+        self.watch(entry.ego)
 
-    def watch(self, vehicle: str, radius: float) -> None:
-        """Have `objects` ready for a vehicle: what is within `radius` [m] of it."""
-        self._sight.watch(vehicle, radius)
+    def watch(self, vehicle: str) -> None:
+        """Have `objects` ready for a vehicle: its surroundings."""
+        self._sight.watch(vehicle)
 
     def remove(self, ego: str) -> None:
         """Take an ego out of the simulation, if SUMO has not done so."""

@@ -11,7 +11,7 @@ import traci.constants as tc
 
 from dvca_sumo.messages import ObjectClass
 from dvca_sumo.roadmap.areas import Shape, Strip
-from dvca_sumo.truth import ObjectsTruth
+from dvca_sumo.truth import SURROUNDINGS, ObjectsTruth
 from dvca_sumo.world.crowd import Body, Crowd
 from dvca_sumo.world.footing import Footing
 from dvca_sumo.world.net import Net, edge_of, is_for_cars
@@ -55,21 +55,20 @@ class Sight:
         self._egos = egos
         self._bodies: dict[str, Body] = {}  # by name, people with "person:" before it
         self._crowds: dict[str, Crowd] = {}  # by watched vehicle
-        self._radii: dict[str, float] = {}  # [m] likewise
         self._strays: tuple[str, ...] | None = None  # egos that SUMO has on no lane, and near nobody; None: not asked
         self._vehicles, self._people = _Readings(self._vehicle_now), _Readings(self._person_now)
         self._footing = Footing(self._walking_area)
 
-    def watch(self, vehicle: str, radius: float) -> None:
-        """Have `objects` ready for a vehicle: what is within `radius` [m] of it. To others it stays as long as now."""
+    def watch(self, vehicle: str) -> None:
+        """Have `objects` ready for a vehicle: its surroundings. To others it stays as long as now."""
         self._vehicle(vehicle)
-        self._crowds[vehicle], self._radii[vehicle] = Crowd(), radius
-        libsumo.vehicle.subscribeContext(vehicle, tc.CMD_GET_VEHICLE_VARIABLE, radius, (_VEHICLE,))
-        libsumo.vehicle.subscribeContext(vehicle, tc.CMD_GET_PERSON_VARIABLE, radius, (_PERSON,))
+        self._crowds[vehicle] = Crowd()
+        libsumo.vehicle.subscribeContext(vehicle, tc.CMD_GET_VEHICLE_VARIABLE, SURROUNDINGS, (_VEHICLE,))
+        libsumo.vehicle.subscribeContext(vehicle, tc.CMD_GET_PERSON_VARIABLE, SURROUNDINGS, (_PERSON,))
 
     def forget(self, vehicle: str) -> None:
         """Watch it no longer; SUMO gives up at the next step where that is removed which it is to look around."""
-        del self._crowds[vehicle], self._radii[vehicle]
+        del self._crowds[vehicle]
         if has(vehicle):
             for kind in (tc.CMD_GET_VEHICLE_VARIABLE, tc.CMD_GET_PERSON_VARIABLE):
                 libsumo.vehicle.unsubscribeContext(vehicle, kind, 0.0)
@@ -113,9 +112,9 @@ class Sight:
             self._strays = tuple(ego for ego in self._egos if not libsumo.vehicle.getLaneID(ego))
         if not self._strays:
             return []
-        place, radius = libsumo.vehicle.getPosition(watched), self._radii[watched]
+        place = libsumo.vehicle.getPosition(watched)
         others = (one for name in self._strays if name != watched for one in self._vehicles[name])
-        return [one for one in others if math.dist(one.motion[:2], place) <= radius]
+        return [one for one in others if math.dist(one.motion[:2], place) <= SURROUNDINGS]
 
     def _walking_area(self, edge: str) -> tuple[Shape, list[Strip]]:
         """The outline of a walking area, and the lanes of vehicles at its junction."""
