@@ -134,6 +134,12 @@ flat_boxes = reshaped("perception", boxes=np.zeros((0, 4)))
 listed_velocities = reshaped("perception", velocities=[])
 brief_poses = reshaped("prediction", poses=np.zeros((0, 3, 3)))
 unnamed_lanes = reshaped("prediction", lanes=((),))
+undecided = reshaped("planning", decision=object())
+uncertain = partial(
+    altered,
+    component="prediction",
+    alter=lambda said: msgspec.structs.replace(said, probabilities=said.probabilities.astype(object)),
+)
 short_points = reshaped("planning", points=np.zeros((80, 7)))
 hasty_points = partial(
     altered,

@@ -116,10 +116,12 @@ def test_a_component_that_answers_with_nonsense_is_named(tmp_path: Path, street:
         ("brief_poses", "prediction raised ValueError: the shape of its poses is (0, 3, 3), and must be (0, 25, 3)"),
         ("unnamed_lanes", "the shape of its lanes is (1,), and must be (0,)"),
         ("short_points", "planning raised ValueError: the shape of its points is (80, 7), and must be (81, 7)"),
+        ("undecided", "planning raised TypeError: its decision is of type object, not str in cycle 0 ("),
+        ("uncertain", "prediction raised TypeError: its probabilities are of type object, not float64 in cycle 0 ("),
         ("hasty_points", "the times of its points are up to 8 s off, and must be TRAJECTORY_TIMES"),
     ],
 )
-def test_an_answer_of_another_shape_is_named(tmp_path: Path, street: Path, stack: str, words: str) -> None:
+def test_an_answer_of_another_shape_or_type_is_named(tmp_path: Path, street: Path, stack: str, words: str) -> None:
     """Whoever reads it next would fail in its place."""
     with pytest.raises(StackError, match=re.escape(words)):
         driven(scenario_file(tmp_path, street), stack=f"small_stacks:{stack}")

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 from small_scenarios import EGO, driven, in_child, scenario_file
-from small_stacks import altered, reshaped
+from small_stacks import undecided
 
 from dvca_sumo.interventions import Fault, Ideal, planted_fault
 from dvca_sumo.messages import (
@@ -148,26 +148,6 @@ def test_what_a_subclass_adds_has_to_fit_into_a_record() -> None:
     assert checked(answer, Trajectory) is answer
     with pytest.raises(TypeError, match="a record holds a object"):
         checked(Explained(**values, why=object()), Trajectory)
-
-
-undecided = reshaped("planning", decision=object())
-uncertain = partial(
-    altered,
-    component="prediction",
-    alter=lambda said: msgspec.structs.replace(said, probabilities=said.probabilities.astype(object)),
-)
-
-
-@pytest.mark.parametrize(
-    ("stack", "words"),
-    [
-        ("undecided", "planning raised TypeError: its decision is of type object, not str in cycle 0 ("),
-        ("uncertain", "prediction raised TypeError: its probabilities are of type object, not float64 in cycle 0 ("),
-    ],
-)
-def test_who_answers_with_another_type_is_named(tmp_path: Path, street: Path, stack: str, words: str) -> None:
-    with pytest.raises(StackError, match=re.escape(words)):
-        driven(scenario_file(tmp_path, street), stack=f"test_answers:{stack}")
 
 
 def undecided_when_long(context: StackContext) -> Stack:
