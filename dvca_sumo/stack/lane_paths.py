@@ -24,7 +24,7 @@ _STEP_X, _STEP_Y, _X, _Y, _HEADING, _HALF_WIDTH, _BEND_SQUARE, _LIMIT_SQUARE, _R
 
 _TAIL = 300  # [m] beyond a dead end or the net's edge, traffic is taken to go straight on
 _LENGTH_STEP = 40.0  # [m] continuations are kept by length in such steps
-_BEND = 5  # columns (metres) to either side over which curvature is taken: nets draw bends as kinks, and gaps, too
+_BEND = 5  # columns (metres) to either side over which curvature is taken: what nets draw as a kink is none
 _WINDOW = np.arange(-8, 9)  # columns (metres) around a guessed station that a projection searches
 
 
