@@ -5,7 +5,7 @@ import numpy as np
 from dvca_sumo.messages import Floats
 from dvca_sumo.oracles.findings import Findings
 from dvca_sumo.oracles.place import Place, Places
-from dvca_sumo.roadmap import Lane, Route
+from dvca_sumo.roadmap import Lane, Route, is_inner
 from dvca_sumo.thresholds import Thresholds
 from dvca_sumo.truth import Moment
 from dvca_sumo.violations import Category, Ending, Judgement, Violation
@@ -82,7 +82,7 @@ def _signed(places: Places) -> list[str]:
     """For each row of the route the lane with a variable sign that sets the limit there; empty without one."""
     lanes: list[str] = []
     for lane in places.route.lane_ids:
-        is_within = lane.startswith(":") and lane not in places.signed_lanes
+        is_within = is_inner(lane) and lane not in places.signed_lanes
         lanes.append(lanes[-1] if is_within and lanes else lane if lane in places.signed_lanes else "")
     return lanes
 
@@ -91,6 +91,6 @@ def _legal_limits(route: Route) -> Floats:
     """Limit [m/s] for each row of the route."""
     limits = np.array(route.speed_limits, dtype=np.float64)
     for row in range(1, len(limits)):
-        if route.lane_ids[row].startswith(":"):
+        if is_inner(route.lane_ids[row]):
             limits[row] = max(limits[row], limits[row - 1])
     return limits

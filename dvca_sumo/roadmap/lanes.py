@@ -9,6 +9,11 @@ from dvca_sumo.geometry.polyline import Polyline
 TURNS_BACK = ("t", "T")  # directions of movements, by SUMO's letters
 
 
+def is_inner(lane: str) -> bool:
+    """Whether a lane is one of a junction, by its name."""
+    return lane.startswith(":")
+
+
 class RoadMapError(ValueError):
     """The net cannot be used; says in one line which file and why."""
 

@@ -6,10 +6,9 @@ import numpy as np
 
 from dvca_sumo.geometry.angles import wrapped
 from dvca_sumo.messages import VehicleShape
-from dvca_sumo.roadmap import Route
+from dvca_sumo.roadmap import Route, is_inner
 from dvca_sumo.truth import EgoTruth
 from dvca_sumo.world.entry import Entry, departure
-from dvca_sumo.world.net import is_inner
 from dvca_sumo.world.session import Motion
 from dvca_sumo.world.straddling import SLOW
 from dvca_sumo.world.vehicle import Vehicle, VehicleLimits

@@ -51,11 +51,6 @@ class Net(Connections, Protocol):
         """Where a road begins and ends."""
 
 
-def is_inner(lane: str) -> bool:
-    """Whether a lane is one of a junction."""
-    return lane.startswith(":")
-
-
 def edge_of(lane: str) -> str:
     """The edge of a lane."""
     return lane.rpartition("_")[0]

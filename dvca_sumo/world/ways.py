@@ -2,7 +2,8 @@
 
 from typing import NamedTuple
 
-from dvca_sumo.world.net import Connections, edge_of, is_inner, junction_of
+from dvca_sumo.roadmap import is_inner
+from dvca_sumo.world.net import Connections, edge_of, junction_of
 
 
 class End(NamedTuple):

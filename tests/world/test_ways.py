@@ -2,7 +2,8 @@
 
 import pytest
 
-from dvca_sumo.world.net import Link, edge_of, is_inner
+from dvca_sumo.roadmap import is_inner
+from dvca_sumo.world.net import Link, edge_of
 from dvca_sumo.world.ways import End, Ways
 
 LINKS = {

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from dvca_sumo.messages import SignalColour, TrackedObjects, VehicleShape
+from dvca_sumo.roadmap import is_inner
 from dvca_sumo.roadmap.lanes import TURNS_BACK
 from dvca_sumo.roadmap.route import Control, Crossing, Route, StopLine
 from dvca_sumo.stack.planning.config import PlanningConfig
@@ -26,7 +27,6 @@ _SWUNG = 1.0  # [m] that a line leads aside to turn back, from which on who stan
 _STRAIGHT = 0.1  # [m] of the rear axle beside the middle of its lane, with which the body is in it
 _SWING = 25.0  # [m] before a line, within which one swings out to turn back
 _ON_YELLOW = 2.0  # [s] for which yellow lasts: who has swung out, and comes to the line within, goes on
-_ON_JUNCTION = ":"  # at the beginning of names of lanes, in SUMO
 _MERGE_REACH = 10.0  # [m] past the junction, where traffic from other approaches still joins
 
 
@@ -240,7 +240,7 @@ def has_priority(views: list[LineView], near: float, far: float, lanes: tuple[st
         line = view.line
         if line.station - 1.0 <= far and near <= line.exit_station + _MERGE_REACH:
             met = [lane for lane in lanes if lane in view.goes_first or lane in line.yields_to or lane in line.crosses]
-            met = [lane for lane in met if lane.startswith(_ON_JUNCTION)] or met
+            met = [lane for lane in met if is_inner(lane)] or met
             if met:
                 return not view.goes_first.isdisjoint(met)
     return None

@@ -9,12 +9,13 @@ import msgspec
 import shapely
 
 from dvca_sumo.messages import VehicleShape
+from dvca_sumo.roadmap import is_inner
 from dvca_sumo.truth import EgoTruth
 from dvca_sumo.world.entry import Entry
 from dvca_sumo.world.inset import Inset, within
 from dvca_sumo.world.itinerary import Itinerary
 from dvca_sumo.world.lingering import Lingering
-from dvca_sumo.world.net import Net, edge_of, is_inner
+from dvca_sumo.world.net import Net, edge_of
 from dvca_sumo.world.session.vehicles import SHADOW, has, shadow_of
 from dvca_sumo.world.setback import Setback
 from dvca_sumo.world.straddling import SLOW, Straddling
@@ -38,9 +39,9 @@ _GOING = "gGoO"  # colours of signals that let go
 
 
 class FrontMotion(NamedTuple):
-    """Of one body."""
+    """Where SUMO has one body, or would have it, and how fast."""
 
-    x: float  # [m] of its front
+    x: float  # [m] of its front; of somebody on foot, of the middle
     y: float  # [m]
     angle: float  # [deg] clockwise from north
     speed: float  # [m/s]
