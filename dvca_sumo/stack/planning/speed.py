@@ -179,8 +179,12 @@ class Driver:
         return max(allowed, self._lowest if needed < _GENTLE_CLOSING else -_HARDER * needed)
 
     def _moved(self, s: float, v: float, a: float, wanted: float) -> tuple[float, float, float]:
-        """One step on, with the acceleration moving linearly towards `wanted` within the limits of jerk."""
-        if wanted >= self._lowest and a >= self._lowest:
+        """One step on, with the acceleration moving linearly towards `wanted` within the limits of jerk.
+
+        An ego that has just set off, and is to stop, does so as fast as when it brakes beyond comfort.
+        """
+        is_setting_off = v < self._config.creeping_speed and wanted < 0.0 < a
+        if wanted >= self._lowest and a >= self._lowest and not is_setting_off:
             change = self._change
         else:
             change, wanted = self._hard_change, max(wanted, -self._config.hard_braking)

@@ -285,6 +285,18 @@ def test_standing_ego_does_not_set_off_beside_a_person_who_walks_up_slowly_and_h
     assert driven.fronts[-1] - driven.fronts[0] < 0.02
 
 
+@pytest.mark.parametrize("gap", [0.6, 0.8, 1.0])
+@pytest.mark.parametrize("leaves", [0.4, 0.6])
+def test_ego_that_has_just_set_off_stops_at_once_for_a_person_who_turns_into_its_side(
+    leaves: float, gap: float
+) -> None:
+    walker = person(3, 20.5, -(0.5 * (SHAPE.width + 0.6) + gap), heading=UP, speed=1.2, leaves=leaves)
+    driven = drive(road(), 3.0, station=20.0, actors=[walker])
+    touched = driven.clearances <= 0.0
+    assert touched.any()
+    assert driven.speeds[touched].max() < 0.05
+
+
 def test_person_who_is_long_across_before_the_ego_comes_is_no_reason_to_stop() -> None:
     driven = drive(road(), 15.0, speed=10.0, actors=[person(3, 140.0, -2.0, heading=UP, speed=1.4)])
     assert driven.speeds.min() > 9.5
