@@ -51,7 +51,10 @@ class Straddling:
         return {lane: part for lane, part in parts.items() if part is not None}
 
     def _rooms_around(self, ends: Sequence[End], found: str, *, goes: bool) -> dict[str, float]:
-        """Lanes whose drivers do not see a body at its route's `ends`, and how far into them it may be [m]."""
+        """Lanes whose drivers do not see a body at its route's `ends`, and how far into them it may be [m].
+
+        Those who drive across the road that its rear is on see who waits on the junction, on a way that theirs meets.
+        """
         front, rear = ends
         beside = [*self._ways.beside(front)]
         for end in dict.fromkeys(ends):
@@ -59,7 +62,8 @@ class Straddling:
                 near = self._net.adjacent(end.lane)
                 beside += [*near, end.lane] if found in near else near
             across, along = self._lying_on(end)
-            beside += across + along if goes else across
+            beside += [lane for lane in across if found not in self._net.foes(lane)]
+            beside += along if goes else []
         # Who comes by the ego's tail cuts bends; who comes by its front it may be waiting for.
         return {lane: self._room(lane) for lane in beside} | dict.fromkeys(self._ways.behind(front, rear), 0.0)
 

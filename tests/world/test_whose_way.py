@@ -23,7 +23,10 @@ MIDDLES = {
     "back_0": [(100.0, 0.0), (0.0, 0.0)],
     ":c_0_0": [(80.0, -10.0), (95.0, 10.0)],
     ":c_1_0": [(80.0, -10.0), (70.0, -9.0)],
+    ":c_2_0": [(100.0, 0.0), (110.0, 0.0)],
+    ":c_3_0": [(100.0, 0.0), (110.0, -10.0)],
 }
+FOES = {":c_0_0": (":c_2_0",)}
 LINKS = {
     "left_0": [Link("out_0", ":c_0_0"), Link("back_0", ":c_1_0")],
     ":c_0_0": [Link("out_0", "")],
@@ -41,7 +44,7 @@ class Crossroads:
         return LINKS.get(lane, [])
 
     def foes(self, lane: str) -> tuple[str, ...]:
-        raise NotImplementedError(lane)
+        return FOES.get(lane, ())
 
     def adjacent(self, lane: str) -> list[str]:
         return {"in_0": ["in_1"], "in_1": ["in_0", "in_2"], "in_2": ["in_1"]}[lane]
@@ -90,6 +93,15 @@ def test_an_ego_that_sumo_has_on_the_next_lane_is_in_the_way_on_its_own(straddli
 def test_who_comes_over_the_road_from_elsewhere_sees_one_on_it(straddling: Straddling) -> None:
     for goes in (True, False):
         assert [*straddling.parts(ego_at(84.0, 0.0), SHAPE, ends_on("in_1"), "in_1", goes=goes)] == [":c_0_0"]
+
+
+@pytest.mark.parametrize(("found", "lanes"), [(":c_2_0", []), (":c_3_0", [":c_0_0"])])
+def test_who_comes_over_the_road_sees_one_whose_front_waits_on_a_way_that_meets_its_own(
+    straddling: Straddling, found: str, lanes: list[str]
+) -> None:
+    """Else all whose way joins that one's would stop behind the ego, too, and the ego wait for them."""
+    ends = End(found, "in_1"), End("in_1", "")
+    assert [*straddling.parts(ego_at(84.0, 0.0), SHAPE, ends, found, goes=True)] == lanes
 
 
 @pytest.mark.parametrize(("goes", "parts"), [(True, {"out_0": pytest.approx((11.0, 16.0))}), (False, {})])
