@@ -1,10 +1,10 @@
-"""How far vehicles are from where prediction had them half a second, one and two seconds before.
+"""How far vehicles and people are from where prediction had them half a second, one and two seconds before.
 
     python benchmarks/prediction.py SUMOCFG [--ego ID|auto] [--begin T] [--end T]
 
-One run without faults. Of each moving vehicle that perception tells within 1.5 m of where it is, the future that comes
+One run without faults. Of each that moves and that perception tells within 1.5 m of where it is, the future that comes
 nearest counts, and of its body the corner that is farthest off. It turns where its heading changes by more than
-0.15 rad until then; it is long from 7 m on. Who is out of the ego's surroundings by then is left out.
+0.15 rad until then; a vehicle is long from 7 m on. Who is out of the ego's surroundings by then is left out.
 """
 
 import argparse
@@ -29,9 +29,10 @@ NEAR = 1.5  # [m] between a vehicle and what perception tells of it
 MOVES = 1.0  # [m/s]
 TURNS = 0.15  # [rad]
 LONG = 7.0  # [m]
+KINDS = (ObjectClass.VEHICLE, ObjectClass.PEDESTRIAN)
 COLUMNS = [int(np.flatnonzero(later == PREDICTION_TIMES)[0]) for later in LATER]
 
-Boxes = dict[str, Floats]  # of the vehicles at one time, by id: (5,) each
+Boxes = dict[str, tuple[str, Floats]]  # of those at one time, by id: the kind and (5,)
 Known = dict[str, Floats]  # futures of those that move and are known of, by id: (h, len(LATER), 3)
 
 
@@ -71,11 +72,11 @@ class Log:
 
 
 def _known(truth: ObjectsTruth, predicted: PredictedObjects) -> tuple[Boxes, Known]:
-    vehicles = np.flatnonzero(truth.classes == ObjectClass.VEHICLE)
-    boxes = {truth.ids[row]: truth.boxes[row] for row in vehicles.tolist()}
+    rows = np.flatnonzero(np.isin(truth.classes, KINDS))
+    boxes = {truth.ids[row]: (_kind(truth, row), truth.boxes[row]) for row in rows.tolist()}
     told, known = predicted.objects.boxes, {}
     speeds = np.hypot(truth.velocities[:, 0], truth.velocities[:, 1])
-    for row in vehicles[speeds[vehicles] >= MOVES].tolist() if len(told) else ():
+    for row in rows[speeds[rows] >= MOVES].tolist() if len(told) else ():
         apart = np.hypot(told[:, 0] - truth.boxes[row, 0], told[:, 1] - truth.boxes[row, 1])
         futures = np.flatnonzero(predicted.owners == apart.argmin())
         if apart.min() < NEAR and futures.size:
@@ -83,22 +84,29 @@ def _known(truth: ObjectsTruth, predicted: PredictedObjects) -> tuple[Boxes, Kno
     return boxes, known
 
 
-def errors(log: Log) -> dict[tuple[bool, bool, float], list[float]]:
-    """Distances of the worst corners [m], by whether it is long, whether it turns, and how much later."""
+def _kind(truth: ObjectsTruth, row: int) -> str:
+    if truth.classes[row] == ObjectClass.PEDESTRIAN:
+        return "people"
+    return "long" if truth.boxes[row, 3] >= LONG else "others"
+
+
+def errors(log: Log) -> dict[tuple[str, str, float], list[float]]:
+    """Distances of the worst corners [m], by kind, whether it turns, and how much later."""
     at = {round(time, 2): boxes for time, boxes, _ in log.cycles}
-    found: dict[tuple[bool, bool, float], list[float]] = defaultdict(list)
+    found: dict[tuple[str, str, float], list[float]] = defaultdict(list)
     for time, boxes, known in log.cycles:
         for name, futures in known.items():
             for column, later in enumerate(LATER):
-                after = at.get(round(time + later, 2), {}).get(name)
-                if after is None:
+                known_after = at.get(round(time + later, 2), {}).get(name)
+                if known_after is None:
                     continue
+                kind, after = known_after
                 foreseen = np.repeat(after[None], len(futures), axis=0)
                 foreseen[:, :3] = futures[:, column]
                 apart = corners(foreseen) - corners(after[None])
                 worst = np.hypot(apart[..., 0], apart[..., 1]).max(axis=1).min()
-                turns = abs(wrapped(float(after[2] - boxes[name][2]))) > TURNS
-                found[bool(after[3] >= LONG), turns, later].append(float(worst))
+                turns = abs(wrapped(float(after[2] - boxes[name][1][2]))) > TURNS
+                found[kind, "turning" if turns else "straight", later].append(float(worst))
     return found
 
 
@@ -118,9 +126,8 @@ def main() -> None:
         return replace(stack, **parts)
 
     driven(dvca_sumo.load_scenario(options.sumocfg, options.ego, begin=options.begin, end=options.end), build)
-    print(f"{'vehicle':<10}{'way':<10}{'later [s]':>10}{'cases':>8}{'mean [m]':>10}{'median':>8}{'90 %':>8}")
-    for (is_long, turns, later), worst in sorted(errors(log).items()):
-        kind, way = "long" if is_long else "others", "turning" if turns else "straight"
+    print(f"{'who':<10}{'way':<10}{'later [s]':>10}{'cases':>8}{'mean [m]':>10}{'median':>8}{'90 %':>8}")
+    for (kind, way, later), worst in sorted(errors(log).items()):
         middle, most = np.quantile(worst, (0.5, 0.9))
         print(f"{kind:<10}{way:<10}{later:10.1f}{len(worst):8d}{np.mean(worst):10.2f}{middle:8.2f}{most:8.2f}")
 
