@@ -36,7 +36,7 @@ class Ground(NamedTuple):
     """One pavement or walking area."""
 
     lane: str
-    edges: shapely.Geometry  # of it and of the grounds next to it, together
+    edges: Floats  # (k, 4) [m] of it and of the grounds next to it, together: where each begins, and on from there
     ways: tuple[Way, ...]  # the crossings that begin at it and at the walking areas next to it
 
 
@@ -79,7 +79,7 @@ class Walkways:
             grown = shapely.union_all(shapely.buffer(self._tree.geometries[near], 0.5 * _TOUCHING, join_style="mitre"))
             together = shapely.buffer(grown, -0.5 * _TOUCHING, join_style="mitre")
             ways = tuple(way for row in near.tolist() for way in self._ways.get(self._lanes[row], ()))
-            self._known[number] = Ground(self._lanes[number], shapely.boundary(together), ways)
+            self._known[number] = Ground(self._lanes[number], _edges(together), ways)
         return self._known[number]
 
 
@@ -88,10 +88,23 @@ def room(points: Floats, directions: Floats, lengths: Floats, grounds: Sequence[
 
     At most `lengths` (n,).
     """
-    rays = shapely.linestrings(np.stack((points, points + directions * lengths[:, None]), axis=1))
-    hits = shapely.intersection(rays, [ground.edges for ground in grounds])
-    found: Floats = np.where(shapely.is_empty(hits), lengths, shapely.distance(shapely.points(points), hits))
+    counts = np.array([len(ground.edges) for ground in grounds])
+    owners, edges = np.repeat(np.arange(len(grounds)), counts), np.concatenate([ground.edges for ground in grounds])
+    (gap_x, gap_y), (edge_x, edge_y) = (edges[:, :2] - points[owners]).T, edges[:, 2:].T
+    x, y = directions[owners].T
+    turns = x * edge_y - y * edge_x
+    with np.errstate(divide="ignore", invalid="ignore"):  # of parallel ones
+        along, across = (gap_x * edge_y - gap_y * edge_x) / turns, (gap_x * y - gap_y * x) / turns
+    is_met = (along >= 0.0) & (across >= 0.0) & (across <= 1.0)
+    nearest = np.minimum.reduceat(np.where(is_met, along, np.inf), counts.cumsum() - counts)
+    found: Floats = np.minimum(nearest, lengths)
     return found
+
+
+def _edges(shape: shapely.Geometry) -> Floats:
+    points, parts = shapely.get_coordinates(shapely.get_parts(shapely.boundary(shape)), return_index=True)
+    edges: Floats = np.hstack((points[:-1], np.diff(points, axis=0)))[np.diff(parts) == 0]
+    return edges if len(edges) else np.full((1, 4), np.nan)  # of nothing
 
 
 def _nearest(areas: dict[str, shapely.Geometry], entry: tuple[float, float]) -> str:
