@@ -25,19 +25,12 @@ class Way(NamedTuple):
     half_width: float  # [m]
 
 
-class Across(NamedTuple):
-    """One crossing, from either end."""
-
-    lane: str
-    ways: tuple[Way, Way]
-
-
 class Ground(NamedTuple):
     """One pavement or walking area."""
 
     lane: str
     edges: Floats  # (k, 4) [m] of it and of the grounds next to it, together: where each begins, and on from there
-    ways: tuple[Way, ...]  # the crossings that begin at it and at the walking areas next to it
+    ways: tuple[Way, ...]  # the crossings that begin here: at walking areas only
 
 
 class Walkways:
@@ -47,7 +40,6 @@ class Walkways:
         crossings = [lane for lane in net.lanes.values() if lane.is_crossing]
         shapes = {lane.id: _strip(lane) for lane in crossings}
         shapes |= {lane.id: _strip(lane) for lane in net.lanes.values() if lane.is_pavement}
-        self._across = {lane.id: _across(lane) for lane in crossings}
         self._ways: dict[str, list[Way]] = defaultdict(list)
         for junction in net.junctions.values():
             names = [name for movement in junction.movements for name in movement.internal]
@@ -55,31 +47,31 @@ class Walkways:
             areas = dict(zip(junction.walking, grounds(junction.walking.values(), strips), strict=True))
             shapes |= areas
             for name in junction.crossings:
-                for way in self._across[name].ways:
+                for way in _ways(net.lanes[name]):
                     self._ways[_nearest(areas, way.entry)].append(way)
         self._lanes = list(shapes)
         self._tree = shapely.STRtree(list(shapes.values()))
         self._crossings = len(crossings)  # come first
         self._known: dict[int, Ground] = {}
 
-    def under(self, points: Floats) -> list[Ground | Across | None]:
-        """For each of `points` (n, 2) the ground it lies on, else the crossing; None on neither."""
-        places: list[Ground | Across | None] = [None] * len(points)
+    def under(self, points: Floats) -> list[Ground | str | None]:
+        """For each of `points` (n, 2) the ground it lies on, else the lane id of the crossing; None on neither."""
+        places: list[Ground | str | None] = [None] * len(points)
         rows, found = self._tree.query(shapely.points(points), predicate="dwithin", distance=_KERB)
         for row, number in sorted(zip(rows.tolist(), found.tolist(), strict=True)):
             is_crossing = number < self._crossings
-            places[row] = self._across[self._lanes[number]] if is_crossing else self._ground(number)
+            places[row] = self._lanes[number] if is_crossing else self._ground(number)
         return places
 
     def _ground(self, number: int) -> Ground:
         if number not in self._known:
             shape = self._tree.geometries[number]
             near = np.sort(self._tree.query(shape, predicate="dwithin", distance=_TOUCHING))
-            near = near[near >= self._crossings]
-            grown = shapely.union_all(shapely.buffer(self._tree.geometries[near], 0.5 * _TOUCHING, join_style="mitre"))
+            grounds = self._tree.geometries[near[near >= self._crossings]]
+            grown = shapely.union_all(shapely.buffer(grounds, 0.5 * _TOUCHING, join_style="mitre"))
             together = shapely.buffer(grown, -0.5 * _TOUCHING, join_style="mitre")
-            ways = tuple(way for row in near.tolist() for way in self._ways.get(self._lanes[row], ()))
-            self._known[number] = Ground(self._lanes[number], _edges(together), ways)
+            lane = self._lanes[number]
+            self._known[number] = Ground(lane, _edges(together), tuple(self._ways.get(lane, ())))
         return self._known[number]
 
 
@@ -117,9 +109,8 @@ def _strip(lane: Lane) -> shapely.Geometry:
     return shapely.buffer(shapely.linestrings(lane.line.points), 0.5 * lane.width, cap_style="flat")
 
 
-def _across(lane: Lane) -> Across:
+def _ways(lane: Lane) -> tuple[Way, Way]:
     begin, end = lane.line.points[0], lane.line.points[-1]
     x, y = ((end - begin) / np.hypot(*(end - begin))).tolist()
     half = 0.5 * lane.width
-    ways = Way(lane.id, tuple(begin.tolist()), (x, y), half), Way(lane.id, tuple(end.tolist()), (-x, -y), half)
-    return Across(lane.id, ways)
+    return Way(lane.id, tuple(begin.tolist()), (x, y), half), Way(lane.id, tuple(end.tolist()), (-x, -y), half)

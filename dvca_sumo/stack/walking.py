@@ -1,13 +1,12 @@
 """Where people go on foot: along the pavement up to its kerb, over a crossing, or, off the pavement, straight on."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from dvca_sumo.messages import PREDICTION_TIMES, Floats, Integers, TrackedObjects
-from dvca_sumo.roadmap.walkways import Across, Ground, Walkways, Way, room
+from dvca_sumo.roadmap.walkways import Ground, Walkways, Way, room
 from dvca_sumo.stack.hypotheses import Hypotheses
 
 _HORIZON = float(PREDICTION_TIMES[-1])  # [s]
@@ -21,7 +20,7 @@ class WalkingConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     veering: float = 0.4  # ... unless they stay on the pavement by turning no more than that [rad]
     kerb_room: float = 0.3  # [m] before the kerb, people stay who do not step off it
     crossing_outlook: float = 4.0  # [s] before a crossing people who walk towards it may be about to cross
-    crossing_angle: float = 1.4  # [rad] between their way and that to the crossing, at most, or across it at its entry
+    crossing_angle: float = 1.0  # [rad] between their way and that to the crossing, at most, or across it at its entry
     at_crossing: float = 1.0  # [m] from its entry
 
 
@@ -29,7 +28,7 @@ class _Crossings(NamedTuple):
     """Ways of people to crossings (h,)."""
 
     rows: Integers  # of those who go
-    lanes: list[tuple[str, ...]]  # the ground they are on, if they are on one, and the crossing
+    lanes: list[tuple[str, ...]]  # the ground they are on, and the crossing
     entries: Floats  # (h, 2) [m] where they come to it, straight across if they are abreast of it
     across: Floats  # (h, 2) its direction
 
@@ -46,7 +45,7 @@ class Walking:
 
         Who is on a pavement walks on along it, turning slightly where that keeps it on, else stays at its kerb, and may
         use each crossing ahead, all equally likely; who is about to step off it, whatever slight turn it makes, who is
-        on the road or on a crossing, goes straight on, or, where a crossing begins, along it.
+        on the road or on a crossing, goes straight on.
         """
         points, velocities = tracked.boxes[rows, :2], tracked.velocities[rows]
         speeds = np.hypot(velocities[:, 0], velocities[:, 1])
@@ -54,7 +53,7 @@ class Walking:
         places = self._walkways.under(points)
         ways = speeds * _HORIZON
         kept = [(row, place) for row, place in enumerate(places) if isinstance(place, Ground)]
-        crossings = self._crossings(points, velocities, speeds, places)
+        crossings = self._crossings(points, velocities, speeds, kept)
         if kept:
             on, grounds = np.array([row for row, _ in kept]), [ground for _, ground in kept]
             enough = speeds[on] * self._config.stepping_off
@@ -63,7 +62,7 @@ class Walking:
             crosses[crossings.rows] = True
             stays = (rooms < ways[on]) & (crosses[on] | (rooms > enough))
             ways[on[stays]] = np.maximum(rooms[stays] - self._config.kerb_room, 0.0)
-        lanes = [() if place is None else (place.lane,) for place in places]
+        lanes = [() if place is None else (place if isinstance(place, str) else place.lane,) for place in places]
         owners = np.concatenate((np.arange(len(rows)), crossings.rows))
         counts = np.bincount(owners, minlength=len(rows))
         walked = np.minimum(speeds[:, None] * PREDICTION_TIMES, ways[:, None])
@@ -103,21 +102,20 @@ class Walking:
         return directions, rooms
 
     def _crossings(
-        self, points: Floats, velocities: Floats, speeds: Floats, places: Sequence[Ground | Across | None]
+        self, points: Floats, velocities: Floats, speeds: Floats, kept: list[tuple[int, Ground]]
     ) -> _Crossings:
-        """Those that people on pavements may be about to use, and those on which people have yet to turn along them."""
-        found = [(row, place, way) for row, place in enumerate(places) if place is not None for way in place.ways]
+        """Those that people on pavements may be about to use."""
+        found = [(row, ground.lane, way) for row, ground in kept for way in ground.ways]
         if not found:
             return _Crossings(np.empty(0, dtype=np.int64), [], np.empty((0, 2)), np.empty((0, 2)))
         config, rows = self._config, np.array([row for row, _, _ in found])
         entries, across = _entries(points[rows], [way for _, _, way in found])
         gaps, own, velocities = entries - points[rows], speeds[rows], velocities[rows]
         distances, least = np.hypot(gaps[:, 0], gaps[:, 1]), np.cos(config.crossing_angle) * own
-        is_off = np.array([isinstance(place, Ground) for _, place, _ in found])
-        towards = is_off & (np.einsum("ij,ij->i", gaps, velocities) > least * distances)
+        towards = np.einsum("ij,ij->i", gaps, velocities) > least * distances
         towards |= (distances < config.at_crossing) & (np.einsum("ij,ij->i", across, velocities) > least)
         used = (towards & (distances < config.crossing_outlook * own)).nonzero()[0]
-        lanes = [tuple(dict.fromkeys((found[one][1].lane, found[one][2].lane))) for one in used.tolist()]
+        lanes: list[tuple[str, ...]] = [(found[one][1], found[one][2].lane) for one in used.tolist()]
         return _Crossings(rows[used], lanes, entries[used], across[used])
 
 

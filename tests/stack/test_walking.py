@@ -158,36 +158,9 @@ def test_away_from_a_crossing_they_do_not_use_it(roadmap: RoadMap) -> None:
 def test_past_the_entry_of_a_crossing_they_do_not_use_it(roadmap: RoadMap) -> None:
     lane, begin, end = crossing(roadmap)
     across = (end - begin) / np.hypot(*(end - begin))
-    past = towards(begin, end) - 1.5
+    past = towards(begin, end) - 1.3
     place = begin - 0.8 * across
     assert all(lanes[-1] != lane for lanes in walking(roadmap, place, past).lanes)
-
-
-def test_on_the_pavement_before_the_walking_area_they_may_use_the_crossing_there(roadmap: RoadMap) -> None:
-    lane, begin, _ = crossing(roadmap)
-    place, heading, strip = pavement(roadmap)
-    area = next(place for place in roadmap.walkways.under(begin[None] - np.array([[0.0, 0.5]])) if place is not None)
-    assert lane in {way.lane for way in area.ways}
-    place = place + np.array([math.cos(heading), math.sin(heading)]) * (begin[0] - place[0] - 5.0)
-    (ground,) = roadmap.walkways.under(place[None])
-    assert ground is not None
-    assert ground.lane == strip
-    assert (strip, lane) in walking(roadmap, place, heading).lanes
-
-
-@pytest.mark.parametrize(("turned", "uses"), [(1.2, True), (-1.2, True), (1.8, False)])
-def test_where_a_crossing_begins_they_go_straight_on_or_along_it(
-    roadmap: RoadMap, turned: float, *, uses: bool
-) -> None:
-    """Though they are past the edge of the walking area already."""
-    lane, begin, end = crossing(roadmap)
-    across = (end - begin) / np.hypot(*(end - begin))
-    place = begin + 0.6 * across
-    found = walking(roadmap, place, towards(begin, end) + turned)
-    assert set(found.lanes) == {(lane,)}
-    ways = (found.poses[:, -1, :2] - place) @ across
-    assert bool(np.isclose(ways, SPEED * PREDICTION_TIMES[-1], atol=1.3).any()) is uses
-    assert np.isclose(ways, SPEED * PREDICTION_TIMES[-1] * math.cos(turned)).any()
 
 
 def test_on_a_crossing_they_go_straight_on(roadmap: RoadMap) -> None:
