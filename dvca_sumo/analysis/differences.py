@@ -188,16 +188,15 @@ def _of_command(said: ControlCommand, occasion: Occasion) -> list[Difference]:
 
 
 def _relevant(occasion: Occasion, focus: str | None) -> list[int]:
-    """Rows of the true objects that matter: `focus` and the one most in the ego's way; all in range without either."""
+    """Rows of the true objects in range that matter: `focus` and the one most in the ego's way; all without either."""
     objects, ego = occasion.moment.objects, occasion.moment.ego
+    gaps = np.hypot(objects.boxes[:, 0] - ego.x, objects.boxes[:, 1] - ego.y)
+    in_range: list[int] = np.flatnonzero(gaps < occasion.sensor_range).tolist()
     matter = [objects.ids.index(focus)] if focus in objects.ids else []
     first = in_way(occasion)
     if first is not None and first not in matter:
         matter.append(first)
-    if matter:
-        return matter
-    gaps = np.hypot(objects.boxes[:, 0] - ego.x, objects.boxes[:, 1] - ego.y)
-    return [int(row) for row in np.flatnonzero(gaps < occasion.sensor_range)]
+    return [row for row in matter if row in in_range] if matter else in_range
 
 
 def _believed(occasion: Occasion, row: int) -> tuple[Floats, Floats]:

@@ -83,6 +83,12 @@ def test_with_nothing_in_the_way_every_object_in_range_counts() -> None:
     assert len(found(PERCEPTION, tracked([], START + 1.0), beside)) == 2
 
 
+@pytest.mark.parametrize("focus", [None, "lead"])
+def test_what_is_out_of_range_is_not_missing(focus: str | None) -> None:
+    lead = Thing("lead", 125.0, 0.0)
+    assert found(PERCEPTION, tracked([], START + 1.0), [lead], focus=focus) == ()
+
+
 def test_a_wrong_place_is_told_as_the_ego_is_headed() -> None:
     off = replace(LEAD, x=LEAD.x + 2.0, y=-1.0)
     said = texts(PERCEPTION, tracked(seen([off]), START + 1.0), [LEAD])
