@@ -46,6 +46,8 @@ class WatchList:
 
     def step(self, objects: TrackedObjects, *, is_standing: bool) -> None:
         """Look around; `is_standing`: the ego stands at its line."""
+        if not self._approaches:
+            return
         if is_standing:
             self._stage = Stage.STOP
         if self._stage is Stage.PRE_STOP:
