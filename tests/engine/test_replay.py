@@ -3,14 +3,16 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from msgspec.structs import replace
 from small_scenarios import EGO, TIMEOUT, driven, scenario_file
 from small_stacks import CRASHING_SEED, RAISING_CYCLE
 
 from dvca_sumo.engine.processes import Failure
 from dvca_sumo.engine.protocol import Glimpse, RunFailedError
 from dvca_sumo.engine.replay import ReplayEngine
-from dvca_sumo.interventions import Ideal
+from dvca_sumo.interventions import Futures, Ideal, recorded_futures
 from dvca_sumo.messages import COMPONENTS, Component
 from dvca_sumo.roadmap import RoadMapError
 from dvca_sumo.run import Task
@@ -219,12 +221,15 @@ def test_a_net_cut_short_is_refused_in_one_line(tmp_path: Path, street: Path) ->
 
 
 def test_an_ideal_prediction_is_repeated_until_it_comes_true(tmp_path: Path, street: Path) -> None:
-    follower = '<vehicle id="behind" depart="0" departPos="8" departSpeed="13"><route edges="bc"/></vehicle>'
-    config = scenario_file(tmp_path, street, EGO + follower)
+    ahead = '<vehicle id="ahead" depart="0" departPos="35" departSpeed="10"><route edges="bc"/></vehicle>'
+    task = Task(load_scenario(scenario_file(tmp_path, street, EGO + ahead)), (Ideal(Component.PREDICTION),))
     engine = ReplayEngine(street, StackSource(), 1, TIMEOUT)
-    task = Task(load_scenario(config), (Ideal(Component.PREDICTION),))
-    (found,) = engine.glimpses([task], lambda _row, _answer: None)
+    factual = engine.record(task)
+    (track,) = recorded_futures(factual.moments).tracks.values()
+    elsewhere = Futures({"ahead": replace(track, poses=track.poses + np.array([3.0, 0.0, 0.0]))})
+    (found,) = engine.glimpses([replace(task, futures=elsewhere)], lambda _row, _answer: None)
     assert isinstance(found, Glimpse)
+    assert found.passes == 2
     assert found.residual is not None
     assert found.residual <= 0.5
-    assert found.simulated == pytest.approx(found.passes * engine.record(task).simulated, rel=0.2)
+    assert found.simulated == pytest.approx(2.0 * factual.simulated, rel=0.2)
