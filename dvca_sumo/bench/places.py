@@ -14,7 +14,7 @@ from dvca_sumo.engine.processes import Failure, isolated
 from dvca_sumo.installation import scenario_path
 from dvca_sumo.record import Record
 from dvca_sumo.report.result import versions
-from dvca_sumo.scenario import AUTO, Scenario, ScenarioError, last_departure, read_configuration
+from dvca_sumo.scenario import AUTO, NoEgoError, Scenario, ScenarioError, last_departure, read_configuration
 from dvca_sumo.store import Store, key_of
 from dvca_sumo.violations import Answer, Ending
 
@@ -58,9 +58,9 @@ def places_of(sumocfg: Path, ego: str | None, begin: float | None) -> tuple[Plac
     """
     if ego is None:
         try:
-            api.load_scenario(sumocfg)
-        except ScenarioError:
-            ego = AUTO  # it names none, or something is wrong that is found below
+            api.load_scenario(sumocfg, begin=begin)
+        except NoEgoError:
+            ego = AUTO
     scenario = api.load_scenario(sumocfg, ego, begin=begin)
     if ego != AUTO or begin is not None:
         return (Place(str(sumocfg), ego, begin),)

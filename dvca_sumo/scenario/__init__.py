@@ -9,7 +9,7 @@ import msgspec
 from dvca_sumo.scenario.configuration import Configuration, content_of, read_configuration, seconds
 from dvca_sumo.scenario.departures import last_departure
 from dvca_sumo.scenario.ego import AUTO, Definitions, find_ego
-from dvca_sumo.scenario.errors import ScenarioError
+from dvca_sumo.scenario.errors import NoEgoError, ScenarioError
 from dvca_sumo.scenario.parameters import MARK, Parameter
 from dvca_sumo.scenario.silence import input_words, silenced
 
@@ -18,6 +18,7 @@ __all__ = [
     "MARK",
     "STEP_LENGTH",
     "Definitions",
+    "NoEgoError",
     "Override",
     "Parameter",
     "Scenario",

@@ -4,7 +4,7 @@ import difflib
 import re
 
 from dvca_sumo.scenario.configuration import Configuration
-from dvca_sumo.scenario.errors import ScenarioError
+from dvca_sumo.scenario.errors import NoEgoError, ScenarioError
 from dvca_sumo.scenario.parameters import MARK, Parameter, parameters_within
 from dvca_sumo.scenario.texts import texts_within
 
@@ -21,7 +21,8 @@ def find_ego(configuration: Configuration, asked: str | None) -> str:
     vehicle id `ego`.
 
     Raises:
-        ScenarioError: There is no such vehicle, candidates being listed; or a mark is neither true nor false.
+        NoEgoError: Nothing says which one it is; candidates are listed.
+        ScenarioError: There is no such vehicle, or several; or a mark is neither true nor false.
     """
     if asked == AUTO:
         return AUTO
@@ -44,7 +45,7 @@ def find_ego(configuration: Configuration, asked: str | None) -> str:
         return marked[0]
     if "ego" in names:
         return "ego"
-    raise ScenarioError(
+    raise NoEgoError(
         f"{configuration.path} names no ego: use --ego ID, --ego auto, or mark a vehicle with "
         f'<param key="dvca.ego" value="true"/> ({_candidates(names)})'
     )

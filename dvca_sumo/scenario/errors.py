@@ -3,3 +3,7 @@
 
 class ScenarioError(ValueError):
     """The scenario cannot be run as given: what was wrong, where, and what is allowed."""
+
+
+class NoEgoError(ScenarioError):
+    """Nothing says which vehicle is the ego."""

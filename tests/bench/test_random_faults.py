@@ -182,6 +182,13 @@ def test_a_scenario_with_an_ego_is_one_place(tmp_path: Path, street: Path) -> No
     assert [(place.ego, place.begin) for place in places_of(config, None, None)] == [(None, None)]
 
 
+def test_a_scenario_with_several_egos_is_no_place(tmp_path: Path, street: Path) -> None:
+    mark = '<param key="dvca.ego" value="true"/>'
+    two = "".join(f'<vehicle id="{name}" depart="0"><route edges="bc"/>{mark}</vehicle>' for name in "ab")
+    with pytest.raises(ScenarioError, match=r"several vehicles are marked .*: a, b;"):
+        places_of(scenario_file(tmp_path, street, two), None, None)
+
+
 def test_without_an_ego_several_times_of_the_traffic_are_tried(tmp_path: Path, street: Path) -> None:
     flow = '<flow id="cars" from="bc" to="bc" begin="0" end="1200" period="10"/>'
     config = scenario_file(tmp_path, street, flow)
