@@ -25,7 +25,7 @@ from dvca_sumo.stack.sensors import Sensors
 from dvca_sumo.truth import Moment, ObjectsTruth
 
 LATER = (0.5, 1.0, 2.0)  # [s]
-NEAR = 1.5  # [m] between a vehicle and what perception tells of it
+NEAR = 1.5  # [m] between where one is and where perception tells it
 MOVES = 1.0  # [m/s]
 TURNS = 0.15  # [rad]
 LONG = 7.0  # [m]

@@ -84,9 +84,9 @@ def room(points: Floats, directions: Floats, lengths: Floats, grounds: Sequence[
     owners, edges = np.repeat(np.arange(len(grounds)), counts), np.concatenate([ground.edges for ground in grounds])
     (gap_x, gap_y), (edge_x, edge_y) = (edges[:, :2] - points[owners]).T, edges[:, 2:].T
     x, y = directions[owners].T
-    turns = x * edge_y - y * edge_x
+    crosses = x * edge_y - y * edge_x
     with np.errstate(divide="ignore", invalid="ignore"):  # of parallel ones
-        along, across = (gap_x * edge_y - gap_y * edge_x) / turns, (gap_x * y - gap_y * x) / turns
+        along, across = (gap_x * edge_y - gap_y * edge_x) / crosses, (gap_x * y - gap_y * x) / crosses
     is_met = (along >= 0.0) & (across >= 0.0) & (across <= 1.0)
     nearest = np.minimum.reduceat(np.where(is_met, along, np.inf), counts.cumsum() - counts)
     found: Floats = np.minimum(nearest, lengths)
