@@ -162,16 +162,22 @@ def _turns(route: Route) -> tuple[tuple[float, float, int], ...]:
 
 
 def _origins(route: Route) -> dict[str, str]:
-    """The lane of a road that leads to each lane of a junction, on the route or beside it, where the ego may be."""
+    """The lane of a road that leads to each lane of a junction, on the route or beside it, where the ego may be.
+
+    On the route also one that is too short for a row of its own.
+    """
     changed = [lanes for change in route.lane_changes for lanes in change.lanes]
     origins = dict[str, str]()
-    for followed in (route.lane_ids, *changed, *(passing.lane_ids for passing in route.passing_lanes)):
+    for followed in (*changed, *(passing.lane_ids for passing in route.passing_lanes)):
         road = ""
         for lane in followed:
             if not is_inner(lane):
                 road = lane
             elif road:
                 origins[lane] = road
+    for line in route.stop_lines:
+        crossed = route.lane_ids[route.row_at(line.station) + 1 : route.row_at(line.exit_station) + 1]
+        origins |= {lane: line.lane for lane in crossed if is_inner(lane)}
     return origins
 
 

@@ -34,6 +34,9 @@ class Connections(Protocol):
     def adjacent(self, lane: str) -> list[str]:
         """The lanes to the right and left of a lane, of the same road."""
 
+    def junctions_of(self, road: str) -> tuple[str, str]:
+        """Where a road begins and ends."""
+
 
 class Net(Connections, Protocol):
     """A road net; the answers never change."""
@@ -46,9 +49,6 @@ class Net(Connections, Protocol):
 
     def lanes_of(self, road: str) -> list[str]:
         """The lanes of a road, from the right."""
-
-    def junctions_of(self, road: str) -> tuple[str, str]:
-        """Where a road begins and ends."""
 
 
 def edge_of(lane: str) -> str:

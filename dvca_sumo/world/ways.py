@@ -1,5 +1,6 @@
 """Ways across junctions, and on which of their lanes SUMO's drivers do not see who is beside them."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from dvca_sumo.roadmap import is_inner
@@ -22,6 +23,7 @@ class Ways:
         self._named: dict[str, list[str]] = {}  # lanes by junction, whether they lead on or not
         self._inner: dict[str, list[str]] = {}  # those that do
         self._blind: dict[End, list[str]] = {}  # those `beside` a front
+        self._behind: dict[tuple[End, End], list[str]] = {}  # those `behind` a front and a rear
 
     def beside(self, front: End) -> list[str]:
         """Lanes of ways from the same lane as a body's front and those next to it, whose drivers do not look for it.
@@ -42,12 +44,29 @@ class Ways:
     def behind(self, front: End, rear: End) -> list[str]:
         """Lanes of the junction that a body's rear is on, from which SUMO's drivers take it to be gone.
 
-        They do so when its front has left the junction, though its tail may still be in their way.
+        They do so when its front has left the junction, though its tail may still be in their way. Not those who come
+        from the next junction, while its front is on that: the road between is so short that they, and all from the
+        same lane, would stop there beside the body, and in its way.
         """
         if not rear.origin or junction_of(rear.lane) == junction_of(front.lane):
             return []
-        edges = {edge_of(lane) for lane in self._way_of(rear)}
-        return [lane for lane in self.inner_lanes(junction_of(rear.lane)) if edge_of(lane) not in edges]
+        ends = front, rear
+        if ends not in self._behind:
+            edges = {edge_of(lane) for lane in (*self._way_of(rear), *self._lanes_back(front))}
+            others = self.inner_lanes(junction_of(rear.lane))
+            self._behind[ends] = [lane for lane in others if edge_of(lane) not in edges]
+        return self._behind[ends]
+
+    def _lanes_back(self, front: End) -> Iterator[str]:
+        """The lanes of a junction on which one comes from the next one, if a body's front is on that."""
+        if not front.origin:
+            return
+        net = self._net
+        before, junction = net.junctions_of(edge_of(front.origin))
+        for road in dict.fromkeys(map(self.lane_after, self.inner_lanes(f":{junction}"))):
+            if net.junctions_of(edge_of(road))[1] == before:
+                for link in net.links(road):
+                    yield from self._way_by(link.via) if link.via else ()
 
     def inner_lanes(self, junction: str) -> list[str]:
         """The lanes of vehicles on a junction that lead on, by the beginning of their names."""

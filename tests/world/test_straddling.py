@@ -201,6 +201,28 @@ def test_an_ego_beside_its_route_has_come_by_the_lane_that_leads_to_where_its_fr
     assert ego.straddled(lane)[0] == End(lane, origin)
 
 
+def test_an_ego_on_a_junction_right_behind_another_one_has_come_by_the_road_between(
+    tmp_path: Path, plain_file: Callable[..., Path]
+) -> None:
+    nodes = (("a", -90, 0), ("b", 0, 0), ("c", 8, 0), ("d", 90, 0), ("n", 0, 90), ("s", 8, -90))
+    roads = ("ab", "bc", "cd", "nb", "cs")
+    net = plain_file(
+        "".join(f'<node id="{name}" x="{x}" y="{y}"/>' for name, x, y in nodes),
+        "".join(f'<edge id="{name}" from="{name[0]}" to="{name[1]}"/>' for name in roads),
+    )
+    trip = '<vehicle id="ego" depart="0" departPos="60" departSpeed="0"><route edges="ab bc cd"/></vehicle>'
+    entry = entered(scenario_file(tmp_path, net, trip))
+    route = RoadMap.load(net).route(entry.edges, entry.lane, entry.position, None, 40.0)
+    assert "bc_0" not in route.lane_ids
+    ego, origins = Ego(entry, route, VehicleLimits()), set[End]()
+    for station in np.arange(ego.station(), 100.0, 0.5).tolist():
+        move = _to(route.line.poses(np.array([station]))[0].tolist(), ego.truth)
+        ego.vehicle.advance(ControlCommand(0.0, 0.0, 0.0, move), STEP)
+        origins.update(ego.straddled(ego.lane()))
+    assert {end.origin for end in origins if end.lane.startswith(":b_")} == {"ab_0"}
+    assert {end.origin for end in origins if end.lane.startswith(":c_")} == {"bc_0"}
+
+
 @pytest.mark.parametrize(("past", "stops"), [(1.0, True), (2.0, False)])  # [m] the front is beyond the junction
 def test_who_comes_by_another_way_stops_for_a_tail_that_is_still_on_the_junction_and_in_its_way(
     tmp_path: Path, plain_file: Callable[..., Path], past: float, *, stops: bool
