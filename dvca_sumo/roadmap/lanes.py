@@ -87,15 +87,11 @@ class Junction(msgspec.Struct, frozen=True, eq=False):
 
     def conflicting(self, movement: Movement) -> frozenset[str]:
         """Lanes of all movements whose paths conflict with `movement`'s."""
-        return _lanes(self.conflicting_movements(movement))
+        return frozenset(lane for one in self.conflicting_movements(movement) for lane in one.lanes)
 
     def conflicting_movements(self, movement: Movement) -> tuple[Movement, ...]:
         """All movements whose paths conflict with `movement`'s, by link index."""
         return self._marked(self.foes.get(movement.index, ""))
-
-    def prior(self, movement: Movement) -> frozenset[str]:
-        """Lanes of the movements that have priority over `movement`."""
-        return _lanes(self.prior_movements(movement))
 
     def prior_movements(self, movement: Movement) -> tuple[Movement, ...]:
         """The movements that have priority over `movement`, by link index."""
@@ -103,7 +99,3 @@ class Junction(msgspec.Struct, frozen=True, eq=False):
 
     def _marked(self, bits: str) -> tuple[Movement, ...]:
         return tuple(movement for bit, movement in zip(reversed(bits), self.movements, strict=False) if bit == "1")
-
-
-def _lanes(movements: tuple[Movement, ...]) -> frozenset[str]:
-    return frozenset(lane for movement in movements for lane in movement.lanes)

@@ -28,7 +28,8 @@ def stop_line(net: NetContents, movement: Movement, line: Polyline, station: flo
     """The stop line before `movement`, which the route drives between two stations of its `line` [m]."""
     junction = net.junctions[movement.junction]
     x, y = net.lanes[movement.from_lane].line.points[-1]
-    yields_to = junction.prior(movement)
+    prior = _prior_movements(net, movement)
+    yields_to = frozenset(lane for one in prior for lane in one.lanes)
     otherwise = Control.YIELD if yields_to else Control.PRIORITY
     control = Control.SIGNAL if movement.signal_id else _CONTROLS.get(movement.state, otherwise)
     return StopLine(
@@ -41,7 +42,7 @@ def stop_line(net: NetContents, movement: Movement, line: Polyline, station: flo
         crosses=junction.conflicting(movement),
         exit_station=exit_station,
         stop_signs=_stop_signs(net, movement) if control in STOP_SIGNS else (),
-        prior=_prior(net, movement),
+        prior=_from_aside(net, movement, prior),
         direction=movement.direction,
         waiting_station=_waiting_station(net, movement, line, station, exit_station),
     )
@@ -66,13 +67,22 @@ def _stop_signs(net: NetContents, movement: Movement) -> tuple[Approach, ...]:
     return tuple(_approach(lane) for lane in _begins(net, stopping) if lane.edge != own)
 
 
-def _prior(net: NetContents, movement: Movement) -> tuple[Approach, ...]:
+def _prior_movements(net: NetContents, movement: Movement) -> list[Movement]:
+    """Those that have priority: where all stop it is who came first, though a net gives everybody's responses."""
+    prior = net.junctions[movement.junction].prior_movements(movement)
+    return [one for one in prior if not (_stops_as_all(movement) and _stops_as_all(one))]
+
+
+def _stops_as_all(movement: Movement) -> bool:
+    return movement.signal_id is None and _CONTROLS.get(movement.state) is Control.ALL_WAY_STOP
+
+
+def _from_aside(net: NetContents, movement: Movement, prior: Iterable[Movement]) -> tuple[Approach, ...]:
     """The approaches of who has priority, but for people, and who merges: that one is seen along its way."""
     own = net.lanes[movement.from_lane].line.headings[-1]
-    lanes = _begins(net, net.junctions[movement.junction].prior_movements(movement))
     return tuple(
         _approach(lane)
-        for lane in lanes
+        for lane in _begins(net, prior)
         if not lane.is_crossing and abs(wrapped(float(lane.line.headings[-1] - own))) > _MERGING
     )
 

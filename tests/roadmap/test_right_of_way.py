@@ -134,10 +134,11 @@ def test_right_before_left(plain: NetBuilder) -> None:
     assert approaches(line.yields_to) == {"sx_0"}
 
 
-def test_all_way_stop_lists_everyone_it_meets(plain: NetBuilder) -> None:
+def test_where_all_stop_nobody_who_stops_goes_first_by_rule(plain: NetBuilder) -> None:
     line = first_line(tee(plain, "allway_stop"), "wx", "xe")
     assert line.control is Control.ALL_WAY_STOP
-    assert line.yields_to == line.crosses != frozenset()
+    assert approaches(line.crosses) == {"sx_0", "ex_0"}
+    assert line.yields_to == frozenset()
 
 
 def test_all_way_stop_knows_the_other_stop_signs(plain: NetBuilder) -> None:
