@@ -103,7 +103,7 @@ class Junctions:
             colour = self._colour(line.signal_id or "", time)
             if colour is not None and not self._is_swinging(index, distance):
                 standing_distance = min(standing_distance, distance - self._swings[index])
-            if line.waiting_station is not None and colour in _GREENS:
+            if line.waiting_station is not None and (distance < 0.0 or colour in _GREENS):
                 waiting_distance = distance + line.waiting_station - line.station
         else:
             stop, goes_first = None, line.yields_to

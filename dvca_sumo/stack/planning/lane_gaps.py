@@ -89,9 +89,11 @@ class Gaps:
         drifted = offsets + _SOON * (velocities[:, 1] * east - velocities[:, 0] * north)
         is_there = (objects.classes != _PERSON) & (stations < change.latest_station) & (np.abs(stations - here) < _SEEN)
         heads_along = (directions > ALONG) & (objects.classes != _STATIC)
+        centres = change.centres(stations)
+        slopes = change.centres(stations + 1.0) - centres  # who keeps to a lane drifts so from a line that does not
         found = []
-        for centre in change.centres(stations):
-            aside = np.minimum(np.abs(offsets - centre), np.abs(drifted - centre))
+        for centre, soon in zip(centres, centres + _SOON * speeds * slopes, strict=True):
+            aside = np.minimum(np.abs(offsets - centre), np.abs(drifted - soon))
             rows = (is_there & (aside < widths + 0.5 * self._shape.width)).nonzero()[0]
             rows = rows[(-stations[rows]).argsort(kind="stable")]
             places, halves = stations[rows] - here, lengths[rows]

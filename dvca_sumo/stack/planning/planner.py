@@ -182,16 +182,21 @@ class Planner:
 
 
 def _merged(demands: dict[int, Demand], graph: Graph) -> list[Stop]:
-    """One stop for each object: the nearest place of all its futures, until the last of them has passed."""
+    """One stop for each object: the nearest place of all its futures, until the last of them has passed.
+
+    Futures that are followed from the first ask for none.
+    """
     stops: dict[int, Stop] = {}
     for row, demand in demands.items():
         track, stop = graph.track(row), demand.stop
+        if stop.until <= 0.0:
+            continue
         if track in stops:
             known = stops[track]
             nearer = min(known, stop, key=lambda each: each.at)
             stop = Stop(nearer.at, nearer.give, stop.label, max(known.until, stop.until))
         stops[track] = stop
-    return [stop for stop in stops.values() if stop.until > 0.0]
+    return list(stops.values())
 
 
 def _described(nudges: list[Nudge], path: Path) -> str:

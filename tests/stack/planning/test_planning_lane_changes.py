@@ -150,6 +150,15 @@ def test_where_a_turn_leads_past_the_first_lane_it_is_not_beside_the_line_before
     assert np.abs(states[:, 2]).max() < 0.1
 
 
+def test_who_keeps_to_the_lane_beyond_the_next_one_is_not_on_it_where_the_line_moves_over() -> None:
+    route = crossing_over()
+    gaps = beside(route, PlanningConfig())
+    others = predicted([car(7, 125.0, 2.0 * WIDTH, speed=20.0), car(8, 125.0, WIDTH, speed=20.0)], 0.0).objects
+    on_own, on_next = gaps.occupied(route.lane_changes[0], 95.0, others)
+    assert on_own.tracks == []
+    assert on_next.tracks == [8]
+
+
 def test_one_that_pulls_into_the_gap_in_time_is_let_in() -> None:
     """A gap that closes while the ego is still in its lane is given up."""
     start = START - SHAPE.front

@@ -814,6 +814,20 @@ def test_oncoming_traffic_is_let_pass_at_green_where_the_junction_has_a_place_to
     assert driven.fronts[-1] > 130.0
 
 
+def test_who_waits_on_the_junction_keeps_its_place_when_the_signal_is_behind_it() -> None:
+    route = road(stop_lines=[stop_line(100.0, Control.SIGNAL, waiting_station=104.0)])
+    stream = [car(k, 110.0, -60.0 - 22.0 * k, heading=UP, speed=8.0, lanes=("major_0",)) for k in range(1, 9)]
+
+    def signals(time: float) -> dict[str, SignalColour]:
+        return {"J/2": SignalColour.PERMISSIVE} if time < 16.0 else {}
+
+    driven = drive(route, 40.0, speed=8.0, actors=stream, signals=signals)
+    standing = driven.fronts[driven.speeds < 0.05]
+    assert 102.0 < standing.min() <= standing.max() < 104.5
+    assert len(standing) > 80
+    assert driven.fronts[-1] > 130.0
+
+
 def test_who_waits_on_the_junction_leaves_it_when_the_oncoming_traffic_has_to_stop() -> None:
     route = road(stop_lines=[stop_line(100.0, Control.SIGNAL, waiting_station=106.0)])
     stream = [
@@ -907,6 +921,26 @@ def test_crossing_traffic_has_no_priority_over_green_but_over_permissive_green()
     permissive = drive(route, 12.0, speed=13.0, actors=actors, signals=lambda _: {"J/2": SignalColour.PERMISSIVE})
     assert green.speeds.min() > 12.9
     assert permissive.speeds.min() < 9.0
+
+
+def test_a_future_that_is_followed_moves_no_place_at_which_another_one_of_the_same_is_let_pass() -> None:
+    one = predicted([car(7, 18.0, 3.2, speed=11.0)], 0.0)
+    turning, changing = one.poses[0].copy(), one.poses[0].copy()
+    changing[:, 1] = np.interp(PREDICTION_TIMES, [1.0, 2.5], [3.2, 0.0])
+    turning[:, 0] -= 9.0 * np.maximum(PREDICTION_TIMES - 3.0, 0.0)
+    turning[:, 1] = np.interp(PREDICTION_TIMES, [3.0, 7.0], [3.2, -4.0])
+    turning[PREDICTION_TIMES > 3.0, 2] = -1.2
+
+    def braking(*futures: Floats) -> float:
+        count = len(futures)
+        shares = np.full(count, 1.0 / count)
+        told = msgspec.structs.replace(
+            one, owners=np.zeros(count, dtype=np.int64), probabilities=shares, poses=np.stack(futures), lanes=((),) * count
+        )
+        planner = Planner(PlanningConfig(), road(lanes_left=1), SHAPE)
+        return float(planner.step(believed(5.0, speed=13.0), told, {}).points[:, 5].min())
+
+    assert braking(changing, turning) == braking(turning) < -1.0
 
 
 def test_car_that_cuts_in_ahead_becomes_the_leader() -> None:
