@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Callable, Iterable, Iterator
 from operator import attrgetter
 from types import NoneType
-from typing import NamedTuple, TypeVar, get_args, get_origin
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin
 
 import msgspec
 import numpy as np
@@ -36,7 +36,7 @@ _CLASSES = {float: (float, int, np.floating, np.integer), np.ndarray: (object,),
 
 
 def checked(answer: object, kind: type[Answer]) -> Answer:
-    """A component's answer, of the types and shapes that `messages` tells: a user's own stack may give anything.
+    """A component's answer, as `messages` tells it: of its types and shapes, and finite. A user's own may be anything.
 
     Nobody can write to its arrays any more; see `freeze`.
     """
@@ -50,15 +50,27 @@ def checked(answer: object, kind: type[Answer]) -> Answer:
     for name, found, wanted in _shapes(answer):
         if found != wanted:
             raise ValueError(f"the shape of its {name} is {found}, and must be {wanted}")
+    _check_numbers(answer, kind)
     for name, items, item in _items(answer):
         is_plain &= _are_plain(name, items, item)
     if not is_plain:
         Digest().step(answer)  # raises where a class of somebody's own has no bytes for a record
-    if isinstance(answer, Trajectory):
-        gap = float(np.abs(answer.points[:, T] - TRAJECTORY_TIMES).max())
+    return answer
+
+
+def _check_numbers(message: object, kind: type) -> None:
+    """Raise a ValueError where numbers in the arrays of a message of this kind are none that may stand there."""
+    for array in _ARRAYS[kind]:
+        if array.number is np.float64 and not np.isfinite(array.of(message)).all():
+            raise ValueError(f"one of its {array.name} is not finite")
+    if isinstance(message, PredictedObjects) and message.owners.size:
+        count = len(message.objects.ids)
+        if message.owners.min() < 0 or message.owners.max() >= count:
+            raise ValueError(f"one of its owners is no row of its {count} objects")
+    if isinstance(message, Trajectory):
+        gap = float(np.abs(message.points[:, T] - TRAJECTORY_TIMES).max())
         if gap > _SAME_TIME:
             raise ValueError(f"the times of its points are up to {gap:g} s off, and must be TRAJECTORY_TIMES")
-    return answer
 
 
 def freeze(message: Message) -> None:
@@ -149,7 +161,7 @@ def _items(message: object) -> Iterator[tuple[str, Iterable[object], type]]:
 class _Array(NamedTuple):
     """In a message."""
 
-    of: Callable[[object], object]
+    of: Callable[[object], Any]
     name: str
     number: type[np.generic]  # that it holds
     codes: str  # of the numbers that it may hold

@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import msgspec
-import numpy as np
 
 from dvca_sumo.geometry.randomness import uniforms
 from dvca_sumo.interventions import Occasion, state_of
@@ -270,10 +269,7 @@ class Drive:
         if channels.localization is None or channels.prediction is None or channels.perception is None:
             return None
         signals = channels.perception.signals
-        plan = checked(self._stack.planning.step(channels.localization, channels.prediction, signals), Trajectory)
-        if not np.isfinite(plan.points).all():
-            raise ValueError("its trajectory holds a number that is not finite")
-        return plan
+        return checked(self._stack.planning.step(channels.localization, channels.prediction, signals), Trajectory)
 
     def _control(self, moment: Moment) -> Message | None:  # noqa: ARG002
         believed = self._channels.localization

@@ -121,6 +121,17 @@ UNFIT: list[tuple[msgspec.Struct, dict[str, Any], str]] = [
         "one of its colours is of type NoneType, not SignalColour",
     ),
     (PREDICTED, {"owners": np.array([True])}, "its owners are of type bool, not int64"),
+    (PREDICTED, {"owners": np.array([1])}, "one of its owners is no row of its 1 objects"),
+    (PREDICTED, {"owners": np.array([-1])}, "one of its owners is no row of its 1 objects"),
+    (PREDICTED, {"probabilities": np.array([np.nan])}, "one of its probabilities is not finite"),
+    (PREDICTED, {"poses": np.full_like(PREDICTED.poses, np.inf)}, "one of its poses is not finite"),
+    (
+        PREDICTED,
+        {"objects": msgspec.structs.replace(TRACKED, boxes=np.full((1, 5), np.nan))},
+        "one of its objects.boxes is not finite",
+    ),
+    (TRACKED, {"velocities": np.full((1, 2), np.nan)}, "one of its velocities is not finite"),
+    (TRAJECTORY, {"points": TRAJECTORY.points + np.inf}, "one of its points is not finite"),
     (PREDICTED, {"lanes": [("ab_0",)]}, "its lanes is of type list, not tuple"),
     (PREDICTED, {"lanes": (["ab_0"],)}, "one of its lanes is of type list, not tuple"),
     (PREDICTED, {"lanes": ((7,),)}, "one of its lanes is of type int, not str"),
@@ -138,7 +149,7 @@ def test_what_fits_is_taken_as_it_is_and_into_a_record(message: msgspec.Struct, 
 @pytest.mark.parametrize(("message", "changed", "words"), UNFIT)
 def test_what_does_not_fit_is_refused(message: msgspec.Struct, changed: dict[str, Any], words: str) -> None:
     answer = msgspec.structs.replace(message, **changed)
-    with pytest.raises((TypeError, OverflowError), match=re.escape(words)):
+    with pytest.raises((TypeError, ValueError, OverflowError), match=re.escape(words)):
         checked(answer, type(message))
 
 
