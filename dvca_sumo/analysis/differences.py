@@ -61,7 +61,7 @@ def differences(record: Record, message: MessageId, futures: Futures, focus: str
     if isinstance(said, LocalizationEstimate) and isinstance(ideal, LocalizationEstimate):
         found = _of_pose(said, ideal)
     elif isinstance(said, TrackedObjects):
-        found = _of_objects(said, occasion, focus)
+        found = _of_objects(said, occasion, focus) + _of_signals(said, occasion)
     elif isinstance(said, PredictedObjects):
         found = _of_predictions(said, occasion, focus)
     elif isinstance(said, ControlCommand):
@@ -99,6 +99,16 @@ def _of_pose(said: LocalizationEstimate, ideal: LocalizationEstimate) -> list[Di
         Difference("position", f"believed {_place(ahead, left)} of the true position", math.hypot(ahead, left)),
         Difference("heading", f"off by {math.degrees(wrapped(turn)):+.1f} degrees", 10.0 * abs(wrapped(turn))),
         Difference("speed", f"{said.speed:.1f} m/s; truth: {ideal.speed:.1f} m/s", abs(said.speed - ideal.speed)),
+    ]
+
+
+def _of_signals(said: TrackedObjects, occasion: Occasion) -> list[Difference]:
+    """Colours that no signal of the route shows; one that is not told may be out of sight."""
+    true = occasion.moment.signals
+    return [
+        Difference("signals", f"signal {name} {colour.value}; truth: {true[name].value}", math.inf)
+        for name, colour in said.signals.items()
+        if name in true and colour is not true[name]
     ]
 
 

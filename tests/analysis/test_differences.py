@@ -1,7 +1,7 @@
 import math
 
 import pytest
-from interventions.scenes import Thing, command, predicted, tracked, trajectory, walker
+from interventions.scenes import RED, Thing, command, predicted, tracked, trajectory, walker
 from msgspec.structs import replace
 
 from analysis.scenes import START, drive, saying
@@ -15,6 +15,7 @@ from dvca_sumo.messages import (
     MessageId,
     ObjectClass,
     PredictedObjects,
+    SignalColour,
     TrackedObjects,
 )
 from dvca_sumo.record import Record
@@ -104,6 +105,14 @@ def test_a_wrong_velocity_is_told_with_the_true_one() -> None:
     off = [replace(thing, speed=(18.0, 0.0)) for thing in seen([LEAD])]
     said = texts(PERCEPTION, tracked(off, START + 1.0), [LEAD])
     assert said == {"velocity": "object lead at 18.0 m/s; truth: 8.0 m/s"}
+
+
+def test_a_wrong_colour_of_a_signal_is_told_but_not_that_one_is_out_of_sight() -> None:
+    (name,) = RED
+    right = tracked(seen([LEAD]), START + 1.0)
+    wrong = replace(right, signals={name: SignalColour.GREEN, "elsewhere": SignalColour.GREEN})
+    assert texts(PERCEPTION, wrong, [LEAD]) == {"signals": f"signal {name} green; truth: red"}
+    assert found(PERCEPTION, replace(right, signals={}), [LEAD]) == ()
 
 
 def test_the_worst_difference_comes_first() -> None:
