@@ -255,6 +255,15 @@ def test_who_need_not_mind_the_egos_way_by_the_net_stops_for_an_ego_that_is_in_i
     assert _is_stopped_for(tmp_path, net, TURNING, lambda lane: lane.startswith(":"), 10.0) is stops
 
 
+def test_devices_of_all_vehicles_do_not_mind_what_stands_for_an_ego_on_a_junction(
+    tmp_path: Path, plain_file: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    net = plain_file(CROSS_NODES, NEARBY_EDGES, NEARBY.format("-1.6,-1.6"))
+    ssm = {"device__ssm__probability": "1"}
+    assert _is_stopped_for(tmp_path, net, TURNING, lambda lane: lane.startswith(":"), 10.0, options=ssm)
+
+
 def test_who_stops_for_an_ego_in_a_way_drawn_over_its_own_does_not_stay_for_ever(
     tmp_path: Path, plain_file: Callable[..., Path]
 ) -> None:
@@ -294,10 +303,16 @@ def test_who_walks_by_an_ego_that_is_hardly_on_the_sidewalk_walks_on(
 
 
 def _is_stopped_for(
-    folder: Path, net: Path, traffic: str, is_there: Callable[[str], bool], past: float, aside: float = 0.0
+    folder: Path,
+    net: Path,
+    traffic: str,
+    is_there: Callable[[str], bool],
+    past: float,
+    aside: float = 0.0,
+    options: dict[str, str] | None = None,
 ) -> bool:
     """Whether somebody stops behind an ego as of `_gaps_to_one_that_stops`; either way nobody touches it."""
-    gaps = _gaps_to_one_that_stops(folder, net, traffic, is_there, past, aside)
+    gaps = _gaps_to_one_that_stops(folder, net, traffic, is_there, past, aside, options=options)
     assert min(gaps) > 0.3
     return gaps[-1] < 5.0
 
@@ -310,6 +325,7 @@ def _gaps_to_one_that_stops(
     past: float,
     aside: float = 0.0,
     steps: int = 250,
+    options: dict[str, str] | None = None,
 ) -> list[float]:
     """How far others are from an ego whose front stops so far [m] past the first of its lanes that is there.
 
@@ -317,7 +333,7 @@ def _gaps_to_one_that_stops(
     """
 
     def job() -> list[float]:
-        world = World(load_scenario(scenario_file(folder, net, traffic), "ego"), folder)
+        world = World(load_scenario(scenario_file(folder, net, traffic, **(options or {})), "ego"), folder)
         entry = world.await_ego((), lambda _: True)
         route = RoadMap.load(net).route(entry.edges, entry.lane, entry.position, None, 100.0)
         ego = world.adopt(entry, route, VehicleLimits())

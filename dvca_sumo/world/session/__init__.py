@@ -58,7 +58,8 @@ class Session:
         types = folder / "ego.add.xml"
         types.write_text(
             f'<additional><vType id="{NEVER_TELEPORTED}" timeToTeleport="-1"/>'
-            f'<vType id="{SHADOW}" vClass="ignoring" timeToTeleport="-1" emergencyDecel="{ANY_BRAKING:g}"/>'
+            f'<vType id="{SHADOW}" vClass="ignoring" timeToTeleport="-1" emergencyDecel="{ANY_BRAKING:g}">'
+            '<param key="has.ssm.device" value="false"/></vType>'
             "</additional>",
             encoding="utf-8",
         )

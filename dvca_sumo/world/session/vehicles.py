@@ -15,8 +15,8 @@ def has(vehicle: str) -> bool:
 
 
 def shadow_of(ego: str, lane: str) -> str:
-    """The name of an ego's shadow on a lane."""
-    return f"{SHADOW}.{lane}.{ego}"
+    """The name of an ego's shadow on a lane; without the colon of junctions, which SUMO's devices stumble over."""
+    return f"{SHADOW}.{lane.replace(':', '~')}.{ego}"
 
 
 def is_shadow(name: str) -> bool:
