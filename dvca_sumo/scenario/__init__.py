@@ -33,8 +33,8 @@ __all__ = [
 
 STEP_LENGTH = 0.1  # [s] of every run, whatever the sumocfg says
 
-# Outputs of one file a step: the name becomes part of theirs, so they go to the run's scratch folder.
-_NUMBERED = {"vtk-output": "vtk"}
+# Outputs of a file each step or vehicle: the name becomes part of theirs, so they go to the run's scratch folder.
+_SEVERAL = {"vtk-output": "vtk", "elechybrid-output": "elechybrid"}
 _SUMO_SEED = 23423  # SUMO's own default, so that a plain `sumo -c` shows the same traffic
 
 
@@ -136,7 +136,7 @@ def _overrides(configuration: Configuration, seed: int, begin: float) -> tuple[O
         wanted.append(("no-internal-links", "false", "junctions are driven over, not jumped"))
     if begin != seconds(options.get("begin", "0"), "begin"):
         wanted.append(("begin", f"{begin:.12g}", "asked for"))
-    outputs = {name: _NUMBERED.get(name, os.devnull) for name in configuration.outputs}
+    outputs = {name: _SEVERAL.get(name, os.devnull) for name in configuration.outputs}
     wanted += [(name, used, "nothing is written for a run") for name, used in outputs.items()]
     never = {"save-state.times": "1e9", "save-state.period": "-1", "save-state.files": os.devnull}
     wanted += [(name, used, "nothing is written for a run") for name, used in never.items() if name in options]
