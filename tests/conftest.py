@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from dvca_sumo.engine.processes import INTERRUPTS
 from dvca_sumo.roadmap import RoadMap
 
 NetBuilder = Callable[..., RoadMap]
@@ -51,7 +52,7 @@ def _interruptible() -> Iterator[None]:
 
     So does a command after the first one, which a test may have called in its own process.
     """
-    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    before = {one: signal.getsignal(one) for one in INTERRUPTS}
     signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     for one, handler in before.items():

@@ -29,7 +29,8 @@ else:
 
 Result = TypeVar("Result")
 
-_INTERRUPTS = (signal.SIGINT, signal.SIGTERM)  # of the terminal, and of what schedules batches
+# Of the terminal, of what schedules batches, and of a terminal that is closed, which not every system has.
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM, *(one for one in signal.Signals if one.name == "SIGHUP"))
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36  # linux/prctl.h
 _SAID_LINES = 60  # of standard error that a failure keeps: SUMO's words stand before a traceback
 
@@ -128,7 +129,7 @@ def _no_interrupts() -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _INTERRUPTS)
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
         yield
     finally:
@@ -138,7 +139,7 @@ def _no_interrupts() -> Iterator[None]:
 def _work(job: Callable[[], object], sender: Connection, log: Path, parent: int) -> None:
     ignore_interrupts()
     if sys.platform != "win32":
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _INTERRUPTS)  # see `_no_interrupts`: a held one is dropped
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPTS)  # see `_no_interrupts`: a held one is dropped
     die_with(parent)
     tempfile.tempdir = str(log.parent)  # so that nothing outlives a killed child
     descriptor = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
@@ -159,7 +160,7 @@ def stop_once() -> None:
 
     Nothing computed is lost then, though some send two: what the first one has printed and kept, another cuts short.
     """
-    for one in _INTERRUPTS:
+    for one in INTERRUPTS:
         if signal.getsignal(one) is not signal.SIG_IGN:
             signal.signal(one, _stop)
 
@@ -171,7 +172,7 @@ def _stop(_number: int, _frame: object) -> None:
 
 def ignore_interrupts() -> None:
     """Leave it to the parent what an interrupt ends."""
-    for one in _INTERRUPTS:
+    for one in INTERRUPTS:
         signal.signal(one, signal.SIG_IGN)
 
 

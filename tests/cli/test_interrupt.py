@@ -52,7 +52,10 @@ def interrupted(
 
 
 @pytest.mark.skipif(os.name != "posix", reason="process groups")
-@pytest.mark.parametrize(("by", "times"), [(signal.SIGINT, 1), (signal.SIGTERM, 1), (signal.SIGINT, 3)])
+@pytest.mark.parametrize(
+    ("by", "times"),
+    [(signal.SIGINT, 1), (signal.SIGTERM, 1), (signal.SIGINT, 3)] + [(signal.SIGHUP, 1)] * (os.name == "posix"),
+)
 @pytest.mark.parametrize("after", ["probe ", "factual run: "])
 def test_an_interrupted_analysis_prints_and_keeps_what_it_has_found(
     tmp_path: Path, by: signal.Signals, times: int, after: str
