@@ -79,10 +79,14 @@ def drive(
     Raises:
         ScenarioError, FaultError, StackError, BugError, RoadMapError: Bad input, in one line.
         RunFailedError: The run's process crashed or hung.
-        ValueError: No such number of repeats.
+        ValueError: No such number of repeats or jobs, or no such engine.
     """
     if repeats is not None and repeats < 1:
         raise ValueError(f"repeats is {repeats} (allowed: 1 or more, or None)")
+    if jobs < 1:
+        raise ValueError(f"jobs is {jobs} (allowed: 1 or more)")
+    if engine is not None and engine not in ENGINES:
+        raise ValueError(f"engine is {engine!r} (allowed: {', '.join(map(repr, ENGINES))}, or None)")
     request = Request(scenario, tuple(planted_fault(text) for text in faults), repeats)
     source = StackSource(stack, bug)
     chosen = ENGINES[engine or DEFAULT_ENGINE](scenario.configuration.net, source, jobs)

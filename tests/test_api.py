@@ -123,6 +123,10 @@ def test_errors_are_named_for_what_was_wrong(tmp_path: Path) -> None:
         dvca_sumo.drive(scenario, stack="nowhere:stack")
     with pytest.raises(ValueError, match=r"repeats is 0 \(allowed: 1 or more"):
         dvca_sumo.drive(scenario, repeats=0)
+    with pytest.raises(ValueError, match=r"jobs is 0 \(allowed: 1 or more"):
+        dvca_sumo.drive(scenario, jobs=0)
+    with pytest.raises(ValueError, match=r"engine is 'x' \(allowed: 'fork', 'replay', or None"):
+        dvca_sumo.drive(scenario, engine="x")
 
 
 def test_the_package_offers_the_three_calls_and_nothing_unknown() -> None:

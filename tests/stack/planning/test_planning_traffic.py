@@ -935,7 +935,11 @@ def test_a_future_that_is_followed_moves_no_place_at_which_another_one_of_the_sa
         count = len(futures)
         shares = np.full(count, 1.0 / count)
         told = msgspec.structs.replace(
-            one, owners=np.zeros(count, dtype=np.int64), probabilities=shares, poses=np.stack(futures), lanes=((),) * count
+            one,
+            owners=np.zeros(count, dtype=np.int64),
+            probabilities=shares,
+            poses=np.stack(futures),
+            lanes=((),) * count,
         )
         planner = Planner(PlanningConfig(), road(lanes_left=1), SHAPE)
         return float(planner.step(believed(5.0, speed=13.0), told, {}).points[:, 5].min())
