@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Sequence
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -82,7 +83,7 @@ class Store(Generic[Kept]):
 
 def key_of(parts: Sequence[object]) -> str:
     """One key for equal questions to the same code and faults, on every machine: what others found is not taken."""
-    return _digest(msgspec.json.encode([parts, _sources()]))
+    return _digest(msgspec.json.encode([parts, _sources(), _libraries()]))
 
 
 @cache
@@ -92,6 +93,11 @@ def _sources() -> str:
     files = {path.relative_to(code).as_posix(): path for path in code.rglob("*.py")}
     files |= {f"faults/{path.name}": path for path in folder("faults").glob("*.toml")}
     return _digest(b"".join(b"%s\0%s\0" % (name.encode(), files[name].read_bytes()) for name in sorted(files)))
+
+
+def _libraries() -> list[str]:
+    """The versions of those that answers come from, beside SUMO's own, which who asks tells."""
+    return [version(name) for name in ("numpy", "shapely", "sumolib")]
 
 
 def _digest(content: bytes) -> str:

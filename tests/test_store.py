@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -83,6 +84,15 @@ def test_a_kept_answer_that_is_no_text_is_named(tmp_path: Path) -> None:
 def test_equal_questions_have_equal_keys_and_others_others() -> None:
     assert key_of([1, "a"]) == key_of([1, "a"])
     assert len({key_of([1, "a"]), key_of(["a", 1]), key_of([1, "b"])}) == 3
+
+
+def test_what_other_versions_of_the_libraries_have_found_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = key_of(["question"])
+    for library in ("numpy", "shapely", "sumolib"):
+        with monkeypatch.context() as patch:
+            patch.setattr("dvca_sumo.store.version", lambda name, own=library: "0" if name == own else version(name))
+            assert key_of(["question"]) != before
+    assert key_of(["question"]) == before
 
 
 @pytest.mark.parametrize("edited", ["dvca_sumo/stack/planning/planner.py", "faults/perception.miss.toml"])

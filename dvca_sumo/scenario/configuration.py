@@ -88,7 +88,9 @@ class Configuration(msgspec.Struct, frozen=True):
 
     @property
     def contents(self) -> tuple[str, ...]:
-        """Digests of the sumocfg and of all files that SUMO reads for it: those of a copy are equal, however old it is.
+        """Digests of the sumocfg, of its options, which variables of the environment may be in, and of the files read.
+
+        Those of a copy are equal, however old it is.
 
         Raises:
             ScenarioError: A file cannot be read.
@@ -99,7 +101,8 @@ class Configuration(msgspec.Struct, frozen=True):
             fresh = [one for one in _read_by(waiting.pop()) if one not in found]
             found.update(dict.fromkeys(fresh))
             waiting += fresh
-        return tuple(content_of(path) for path in found)
+        options = hashlib.blake2b(msgspec.json.encode(sorted(self.options.items()))).hexdigest()
+        return options, *(content_of(path) for path in found)
 
     def _others(self) -> list[Path]:
         """Files that other options name, a state to begin with for one; none that SUMO would write."""

@@ -170,6 +170,17 @@ def test_contents_are_those_of_files_with_encoded_names_too(tmp_path: Path, net:
     assert configuration.contents != before
 
 
+def test_contents_change_with_a_variable_of_the_environment_that_an_option_is_told_by(
+    tmp_path: Path, net: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = scenario_file(tmp_path, net, scale="${SCALE_OF_TODAY}")
+    found = set()
+    for scale in ("1", "1", "2"):
+        monkeypatch.setenv("SCALE_OF_TODAY", scale)
+        found.add(read_configuration(config).contents)
+    assert len(found) == 2
+
+
 def test_lists_of_files_are_taken_apart_and_relative_to_the_configuration(tmp_path: Path, net: Path) -> None:
     (tmp_path / "a").mkdir()
     for name in ("one.rou.xml", "two words.rou.xml"):
