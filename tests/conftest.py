@@ -48,11 +48,14 @@ def _converted(folder: Path, nodes: str, edges: str, connections: str = "") -> P
 
 @pytest.fixture(autouse=True)
 def _interruptible() -> Iterator[None]:
-    """Workers of pytest-xdist and background jobs of a shell are born to ignore interrupts.
+    """Workers of pytest-xdist and background jobs of a shell are born to ignore interrupts; `nohup` has it so, too.
 
     So does a command after the first one, which a test may have called in its own process.
     """
     before = {one: signal.getsignal(one) for one in INTERRUPTS}
+    for one, handler in before.items():
+        if handler is signal.SIG_IGN:
+            signal.signal(one, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     for one, handler in before.items():
