@@ -37,7 +37,11 @@ def _arguments(nets: list[str], egos: int) -> argparse.Namespace:
     parser.add_argument("--egos", default=str(egos))
     parser.add_argument("--seed", default="1")
     parser.add_argument("--jobs", default="1")
-    return parser.parse_args()
+    asked = parser.parse_args()
+    for name in asked.nets.split(","):
+        if name not in nets:
+            parser.error(f"no net {name!r} (allowed: {', '.join(nets)})")
+    return asked
 
 
 def run(program: str, options: list[str], folder: Path) -> None:
